@@ -1,0 +1,1 @@
+"""Non-linear model predictive control for the DJI Matrice 100."""

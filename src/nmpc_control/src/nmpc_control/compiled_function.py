@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""CasADi functions as compiled C: generated once, cached by source, compiler, flags and processor."""
+
+import hashlib
+import logging
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Dict, Optional, Sequence
+
+import casadi as ca
+import numpy as np
+
+LOGGER = logging.getLogger(__name__)
+# no -ffast-math: it makes NaN checks lie and flushes denormals for the whole process
+FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fPIC", "-shared")
+
+
+def cache_directory() -> Path:
+    """Return the folder for compiled code: ``$NMPC_CACHE`` or ``~/.cache/nmpc_control``."""
+    default = Path(os.path.expanduser("~")) / ".cache" / "nmpc_control"
+    return Path(os.environ.get("NMPC_CACHE", default))
+
+
+def compile_functions(functions: Sequence[ca.Function], compiler: str = "cc") -> Dict[str, ca.Function]:
+    """Return the functions as compiled code, by name; as they are where there is no compiler."""
+    interpreted = {f.name(): f for f in functions}
+    program = shutil.which(compiler)
+    if program is None:
+        LOGGER.warning("no C compiler %r: solving with CasADi's interpreter, about ten times slower", compiler)
+        return interpreted
+    try:
+        library = _library(functions, program)
+    except (OSError, subprocess.CalledProcessError) as error:
+        detail = getattr(error, "stderr", "") or str(error)
+        LOGGER.warning("compilation failed, solving with CasADi's interpreter: %s", detail.strip()[-500:])
+        return interpreted
+    return {name: ca.external(name, str(library)) for name in interpreted}
+
+
+def _library(functions: Sequence[ca.Function], program: str) -> Path:
+    generator = ca.CodeGenerator("nmpc.c", {"with_header": False})
+    for function in functions:
+        generator.add(function)
+    source = generator.dump()
+    version = subprocess.run([program, "--version"], check=True, capture_output=True, text=True).stdout
+    key = "\0".join([source, version, " ".join(FLAGS), _processor(), ca.__version__])
+    directory = cache_directory()
+    directory.mkdir(parents=True, exist_ok=True)
+    library = directory / f"nmpc_{hashlib.sha256(key.encode()).hexdigest()[:32]}.so"
+    if library.exists():
+        return library
+    with tempfile.TemporaryDirectory(dir=directory) as folder:
+        c_file, product = Path(folder) / "nmpc.c", Path(folder) / "nmpc.so"
+        c_file.write_text(source)
+        subprocess.run(
+            [program, *FLAGS, str(c_file), "-o", str(product), "-lm"], check=True, capture_output=True, text=True
+        )
+        os.replace(product, library)  # atomic: another process may be doing the same
+    return library
+
+
+def _processor() -> str:
+    """Return a text that changes with the instruction set that -march=native means here."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith(("flags", "Features")):
+                return line
+    except OSError:
+        pass
+    return f"{platform.machine()} {platform.processor()}"
+
+
+class Buffered:
+    """A CasADi function called through fixed buffers: no allocation, the GIL is released during the call.
+
+    ``inputs[name]`` and ``outputs[name]`` are numpy arrays (Fortran order) that the call reads and writes.
+    """
+
+    def __init__(self, function: ca.Function, shared: Optional[Dict[str, np.ndarray]] = None) -> None:
+        self._function = function
+        self._buffer, self._trigger = function.buffer()
+        self.inputs: Dict[str, np.ndarray] = {}
+        self.outputs: Dict[str, np.ndarray] = {}
+        for i in range(function.n_in()):
+            array = self._array(function.name_in(i), function.size_in(i), shared)
+            self.inputs[function.name_in(i)] = array
+            self._buffer.set_arg(i, memoryview(array.T))
+        for i in range(function.n_out()):
+            array = self._array(function.name_out(i), function.size_out(i), shared)
+            self.outputs[function.name_out(i)] = array
+            self._buffer.set_res(i, memoryview(array.T))
+
+    @staticmethod
+    def _array(name: str, size: Sequence[int], shared: Optional[Dict[str, np.ndarray]]) -> np.ndarray:
+        if shared is not None and name in shared:
+            return shared[name]
+        array = np.zeros(tuple(size), order="F")
+        if shared is not None:
+            shared[name] = array
+        return array
+
+    def __call__(self) -> bool:
+        """Evaluate; returns whether the function reported success."""
+        self._trigger()
+        return self._buffer.ret() == 0

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: MIT
+"""The controller's optimiser: poses the problem of ``ocp``, keeps the warm start, returns plans."""
+
+from dataclasses import replace
+from typing import List, Optional, Sequence, Union
+
+import numpy as np
+
+from nmpc_control.ipopt import IpoptSolver
+from nmpc_control.ocp import SLOT_SIZE, Instance, Structure, pack_stages, pack_theta
+from nmpc_control.params import Parameters
+from nmpc_control.solution import Guess, Solution, shift
+from nmpc_control.sqp import SqpSolver
+from nmpc_control.state import GRAVITY, Obstacle, Plan, hover_input
+
+
+class Nmpc:
+    """Non-linear model predictive controller: state, reference and obstacles in, plan out."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        p = parameters.solver
+        self.parameters = parameters
+        self.structure = Structure(p.horizon, p.dt, p.integrator, p.obstacle_slots)
+        backend = SqpSolver if p.backend == "compiled" else IpoptSolver
+        self.solver: Union[SqpSolver, IpoptSolver] = backend(
+            self.structure, p.tolerance, p.max_iterations, p.time_budget
+        )
+        self._last: Optional[Solution] = None
+        self._last_t = 0.0
+        self._disturbance = np.zeros(3)
+        self._theta = self._pack_theta()
+
+    def use(self, parameters: Parameters) -> None:
+        """Take over other weights, limits, avoidance or vehicle from the next solve on; the structure stays."""
+        self.parameters = replace(parameters, solver=self.parameters.solver)
+        self._theta = self._pack_theta()
+
+    def reset(self) -> None:
+        """Forget the last solution: the next solve starts from hover."""
+        self._last = None
+
+    def stage_times(self, t: float) -> np.ndarray:
+        """Return the times (N + 1,) [s] at which the telemetry shows the stages of a plan made for ``t``."""
+        N = self.structure.horizon
+        return t + self.parameters.vehicle.delay + self.structure.dt * np.arange(N + 1)
+
+    def solve(
+        self,
+        t: float,
+        x0: np.ndarray,
+        x_ref: np.ndarray,
+        u_before: np.ndarray,
+        obstacles: Sequence[Obstacle] = (),
+        u_ref: Optional[np.ndarray] = None,
+    ) -> Plan:
+        """Return a plan; ``found`` False where the solver has none.
+
+        Args:
+            t: time [s] at which the first input will be commanded.
+            x0: (10,) state expected at ``t + delay``.
+            x_ref: (N + 1, 10) reference at ``stage_times(t)``.
+            u_before: (4,) input commanded before ``t``.
+            obstacles: any number; those nearest in prediction fill the slots.
+            u_ref: (4,) or (N, 4) reference input, hover by default.
+
+        Raises:
+            ProblemError: a reference or obstacle of wrong shape or not finite.
+        """
+        guess = self._guess(t)
+        slots = self._slots(t, obstacles, x_ref[:, :3] if guess is None else guess.states[:, :3])
+        stages = pack_stages(self.structure, x_ref, hover_input(GRAVITY) if u_ref is None else u_ref, slots)
+        solution = self.solver.solve(Instance(x0, u_before, stages, self._theta), guess)
+        self._last, self._last_t = (solution, t) if solution.found else (None, 0.0)
+        return Plan(
+            t=t,
+            dt=self.structure.dt,
+            delay=self.parameters.vehicle.delay,
+            states=solution.states,
+            inputs=solution.inputs,
+            found=solution.found,
+            status=solution.status,
+            iterations=solution.iterations,
+            solve_time=solution.solve_time,
+            cost=solution.cost,
+            kkt_residual=solution.kkt_residual,
+        )
+
+    def _pack_theta(self) -> np.ndarray:
+        p = self.parameters
+        return pack_theta(p.vehicle, p.weights, p.limits, p.avoidance, self._disturbance)
+
+    def _guess(self, t: float) -> Optional[Guess]:
+        if self._last is None:
+            return None
+        stages = (t - self._last_t) / self.structure.dt
+        if not 0.0 <= stages < self.structure.horizon / 2:
+            return None
+        return shift(Guess(self._last.states, self._last.inputs, self._last.gains), stages)
+
+    def _slots(self, t: float, obstacles: Sequence[Obstacle], path: np.ndarray) -> List[np.ndarray]:
+        """Return slot data (N + 1, 5) of the obstacles that come nearest to the path (N + 1, 3)."""
+        if not self.parameters.avoidance.enabled:
+            return []
+        times = self.stage_times(t)
+        margin = self.parameters.vehicle.radius + self.parameters.avoidance.safety_distance
+        margin += self.parameters.avoidance.inflation
+        ranked = []
+        for obstacle in obstacles:
+            centres = np.array([obstacle.position_at(s) for s in times])
+            vertical, radius = 1.0, obstacle.size[0]
+            if obstacle.shape == "cylinder":
+                vertical = 0.0
+            elif obstacle.shape == "box":
+                radius = 0.5 * float(np.linalg.norm(obstacle.size))
+            slot = np.empty((len(times), SLOT_SIZE))
+            slot[:, :3], slot[:, 3], slot[:, 4] = centres, vertical, 1.0 / (radius + margin)
+            offset = (path - centres) * [1.0, 1.0, np.sqrt(vertical)]
+            ranked.append((float(np.min(np.linalg.norm(offset, axis=1)) - radius), len(ranked), slot))
+        ranked.sort(key=lambda item: item[:2])
+        return [slot for _, _, slot in ranked[: self.structure.obstacle_slots]]

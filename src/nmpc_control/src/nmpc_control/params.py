@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: MIT
+"""Parameters of vehicle, problem, solver and controller; values live in ``config/*.yaml``, here is what they mean."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Optional
+
+import numpy as np
+
+from nmpc_control.config import config_directory, from_dict, load_yaml
+
+
+def _array(length: int, minimum: float = -1e9) -> np.ndarray:
+    return field(metadata={"length": length, "min": minimum})
+
+
+def _positive() -> float:
+    return field(metadata={"min": 1e-6})
+
+
+def _non_negative() -> float:
+    return field(metadata={"min": 0.0})
+
+
+@dataclass(frozen=True)
+class Lag:
+    """First-order response of one inner loop: ``x' = (gain * reference - x) / time_constant`` (paper, Eq. 3)."""
+
+    time_constant: float = _positive()  # [s]; the paper's tau / k
+    gain: float = _positive()  # [1] static gain; 1 in the paper
+
+
+@dataclass(frozen=True)
+class ThrustMap:
+    """Affine map of the DJI thrust percentage: ``thrust = slope * percent + offset``, at hover attitude."""
+
+    slope: float = _positive()  # [m/s^2 per percent]
+    offset: float = field()  # [m/s^2]
+    minimum: float = field(metadata={"min": 0.0, "max": 100.0})  # [percent] least that is sent
+    maximum: float = field(metadata={"min": 0.0, "max": 100.0})  # [percent] most that is sent
+    measured_on: str = field()  # airframe and date of the measurement; empty: not measured
+
+    def percent(self, thrust: float) -> float:
+        """Return the percentage for a mass-normalised thrust [m/s^2], clamped to the map's range."""
+        return min(max((thrust - self.offset) / self.slope, self.minimum), self.maximum)
+
+    def thrust(self, percent: float) -> float:
+        """Return the mass-normalised thrust [m/s^2] of a percentage."""
+        return self.slope * percent + self.offset
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """What the controller knows of the aircraft that it flies."""
+
+    name: str
+    mass: float = _positive()  # [kg] only to convert published thrust figures
+    radius: float = _non_negative()  # [m] hull: centre to the outermost propeller tip
+    roll: Lag = field()
+    pitch: Lag = field()
+    yaw_rate: Lag = field()
+    drag: np.ndarray = _array(3, 0.0)  # (3,) [1/s] world x, y, z
+    delay: float = _non_negative()  # [s] dead time from command to effect in the telemetry
+    tilt_limit: float = _positive()  # [rad] the flight controller's own limit of the tilt vector's norm
+    thrust_map: ThrustMap = field()
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of Eq. 5, all diagonal; they multiply squared errors in SI units, without a factor 1/2."""
+
+    Q: np.ndarray = _array(10, 0.0)
+    Q_f: np.ndarray = _array(10, 0.0)
+    R: np.ndarray = _array(4, 0.0)
+    R_delta: np.ndarray = _array(4, 0.0)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds of the inputs (paper, Eq. 6)."""
+
+    input_min: np.ndarray = _array(4)  # (4,) [m/s^2, rad, rad, rad/s]
+    input_max: np.ndarray = _array(4)  # (4,)
+
+
+@dataclass(frozen=True)
+class Avoidance:
+    """Repulsive potential of Eq. 8, with the distance counted from the hull."""
+
+    enabled: bool = field()
+    eta: float = _non_negative()  # gain of the potential
+    safety_distance: float = _non_negative()  # [m] hull to surface
+    inflation: float = _non_negative()  # [m] added to the distance at which the potential begins
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Which backend solves the problem, and when it stops."""
+
+    backend: str = field(metadata={"choices": ("compiled", "ipopt")})
+    integrator: str = field(metadata={"choices": ("exact_lag", "rk4", "euler")})
+    horizon: int = field(metadata={"min": 2, "max": 1000})  # N, number of stages
+    dt: float = _positive()  # [s]
+    obstacle_slots: int = field(metadata={"min": 0, "max": 256})
+    max_iterations: int = field(metadata={"min": 1, "max": 1000})
+    time_budget: float = _positive()  # [s] wall time for one solve
+    tolerance: float = _positive()  # norm of the projected gradient at which the solution counts as exact
+
+
+@dataclass(frozen=True)
+class Flight:
+    """How the controller moves between trajectories."""
+
+    rate: float = _positive()  # [Hz] solves per second
+    approach_speed: float = _positive()  # [m/s] on the way to the start of a trajectory
+    approach_acceleration: float = _positive()  # [m/s^2]
+    arrival_distance: float = _positive()  # [m]
+    arrival_speed: float = _positive()  # [m/s]
+    settle_time: float = _non_negative()  # [s] at rest at the start before the trajectory's clock runs
+    arrival_timeout: float = _positive()  # [s] after the end of the trajectory's time
+    state_timeout: float = _positive()  # [s] a state older than this is not flown on
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Everything the controller needs."""
+
+    vehicle: Vehicle
+    weights: Weights
+    limits: Limits
+    avoidance: Avoidance
+    solver: Solver
+    flight: Flight
+
+
+def load_vehicle(name: str, directory: Optional[Path] = None) -> Vehicle:
+    """Return the vehicle of ``config/vehicles/<name>.yaml``; raises ConfigError."""
+    path = (directory or config_directory()) / "vehicles" / f"{name}.yaml"
+    return from_dict(Vehicle, load_yaml(path), path.name)
+
+
+def load_weights(name: str, directory: Optional[Path] = None) -> Weights:
+    """Return the weight preset of ``config/weights/<name>.yaml``; raises ConfigError."""
+    path = (directory or config_directory()) / "weights" / f"{name}.yaml"
+    return from_dict(Weights, load_yaml(path), path.name)
+
+
+def load_parameters(vehicle: str = "dji_hil", weights: str = "outdoor", directory: Optional[Path] = None) -> Parameters:
+    """Return the controller's parameters with a vehicle and a weight preset; raises ConfigError."""
+    directory = directory or config_directory()
+    path = directory / "controller.yaml"
+    data = load_yaml(path)
+    return from_dict(
+        _File, data, path.name
+    ).with_presets(load_vehicle(vehicle, directory), load_weights(weights, directory))
+
+
+@dataclass(frozen=True)
+class _File:
+    limits: Limits
+    avoidance: Avoidance
+    solver: Solver
+    flight: Flight
+
+    def with_presets(self, vehicle: Vehicle, weights: Weights) -> Parameters:
+        return Parameters(vehicle, weights, self.limits, self.avoidance, self.solver, self.flight)

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: MIT
+"""The two sweeps of the compiled solver as CasADi functions: backward (Newton system), forward (rollout).
+
+Backward, from stage N to 0 (discrete-time Riccati recursion of the Gauss-Newton model, see e.g. Frison and
+Jorgensen 2013; here the previous input is part of the state, so that R_delta keeps the stage structure):
+the exact adjoint gives the gradient g of the cost with respect to every input; inputs that sit on a bound
+with the gradient pushing outward are held (Bertsekas 1982, projected Newton); the others get the feedback
+law du = k + K [dx; du_before]. Forward: the model is rolled out under that law with step length alpha, inputs
+clipped to their bounds, so every iterate satisfies dynamics and bounds exactly.
+"""
+
+from typing import List, Tuple
+
+import casadi as ca
+
+from nmpc_control.ocp import THETA_SIZE, Structure, Symbols, next_state, residuals, stage_cost
+from nmpc_control.state import NU, NX
+
+NZ = NX + NU  # state of the recursion: x and the input before
+_ACTIVE_TOLERANCE = 1e-9  # [input unit] distance at which an input counts as on its bound
+
+
+def sweeps(structure: Structure) -> Tuple[ca.Function, ca.Function]:
+    """Return the functions ``backward`` and ``forward`` over the whole horizon.
+
+    backward(X (10, N+1), U (4, N), u_before (4,), stages, theta, damping) ->
+        gains (4, 14 N), step (4, N), summary (4,): slope and curvature of the predicted cost change along the
+        step, largest projected gradient (scaled by the input ranges), number of active bounds
+    forward(x0 (10,), u_before (4,), X, U, gains, step, alpha, stages, theta) -> X_new, U_new, cost
+    """
+    return _backward(structure), _forward(structure)
+
+
+def _backward(structure: Structure) -> ca.Function:
+    N = structure.horizon
+    last, inner = _terminal_model(structure), _stage_backward(structure)
+    X, U = ca.MX.sym("X", NX, N + 1), ca.MX.sym("U", NU, N)
+    u_before, stages = ca.MX.sym("u_before", NU), ca.MX.sym("stages", structure.stage_size, N + 1)
+    theta, damping = ca.MX.sym("theta", THETA_SIZE), ca.MX.sym("damping")
+    xs, us, data = ca.horzsplit(X), ca.horzsplit(U), ca.horzsplit(stages)
+    P, s, adjoint = last(xs[N], data[N], theta)
+    gains: List[ca.MX] = [None] * N
+    step: List[ca.MX] = [None] * N
+    summary = ca.MX.zeros(4)
+    for k in reversed(range(N)):
+        before = us[k - 1] if k else u_before
+        gains[k], step[k], P, s, adjoint, summary = inner(
+            xs[k], us[k], before, data[k], theta, damping, P, s, adjoint, summary
+        )
+    return ca.Function(
+        "backward",
+        [X, U, u_before, stages, theta, damping],
+        [ca.horzcat(*gains), ca.horzcat(*step), summary],
+        ["X", "U", "u_before", "stages", "theta", "damping"],
+        ["gains", "step", "summary"],
+    )
+
+
+def _terminal_model(structure: Structure) -> ca.Function:
+    s = Symbols(structure)
+    r, w = residuals(structure, s, terminal=True)
+    J = ca.jacobian(r, s.x)
+    gradient = 2 * J.T @ (w * r)
+    P = ca.SX(NZ, NZ)
+    P[:NX, :NX] = 2 * J.T @ (ca.diag(w) @ J)
+    adjoint = ca.vertcat(gradient, ca.SX.zeros(NU))
+    return ca.Function("terminal_model", [s.x, s.stage, s.theta], [_upper(P), adjoint, adjoint])
+
+
+def _stage_backward(structure: Structure) -> ca.Function:
+    s = Symbols(structure)
+    damping = ca.SX.sym("damping")
+    P_half = ca.SX.sym("P", NZ * (NZ + 1) // 2)
+    value_gradient, adjoint = ca.SX.sym("s", NZ), ca.SX.sym("adjoint", NZ)
+    summary = ca.SX.sym("summary", 4)
+    P = _symmetric(P_half)
+    Pxx, Pxu, Puu = P[:NX, :NX], P[:NX, NX:], P[NX:, NX:]
+
+    x_next = next_state(structure, s)
+    A, B = ca.jacobian(x_next, s.x), ca.jacobian(x_next, s.u)
+    r, w = residuals(structure, s, terminal=False)
+    z = ca.vertcat(s.x, s.u_before)
+    Jz, Ju = ca.jacobian(r, z), ca.jacobian(r, s.u)
+    cost_z, cost_u = 2 * Jz.T @ (w * r), 2 * Ju.T @ (w * r)
+    W = ca.diag(w)
+
+    # exact gradient of the cost along the dynamics, and the bounds that hold an input
+    gradient = cost_u + B.T @ adjoint[:NX] + adjoint[NX:]
+    held_low = ca.logic_and(s.u <= s.u_min + _ACTIVE_TOLERANCE, gradient > 0)
+    held_high = ca.logic_and(s.u >= s.u_max - _ACTIVE_TOLERANCE, gradient < 0)
+    free = 1 - ca.logic_or(held_low, held_high)
+    adjoint_before = cost_z + ca.vertcat(A.T @ adjoint[:NX], ca.SX.zeros(NU))
+
+    # Gauss-Newton model of the cost to go in (dz, du)
+    PA, BP = Pxx @ A, B.T @ Pxx + Pxu.T
+    Qzz = 2 * Jz.T @ (W @ Jz)
+    Qzz[:NX, :NX] += A.T @ PA
+    Quz = 2 * Ju.T @ (W @ Jz)
+    Quz[:, :NX] += BP @ A
+    Quu = 2 * Ju.T @ (W @ Ju) + BP @ B + B.T @ Pxu + Puu
+    qu = cost_u + B.T @ value_gradient[:NX] + value_gradient[NX:]
+    qz = cost_z + ca.vertcat(A.T @ value_gradient[:NX], ca.SX.zeros(NU))
+
+    F = ca.diag(free)
+    L = _cholesky(F @ (Quu + damping * ca.SX.eye(NU)) @ F + ca.diag(1 - free))
+    step = -_solve(L, free * qu)
+    gains = -_solve(L, F @ Quz)
+    half = _forward_substitution(L, F @ Quz)
+    P_before = Qzz - half.T @ half
+    s_before = qz + (F @ Quz).T @ step
+
+    span = s.u_max - s.u_min
+    violation = ca.mmax(ca.fabs(s.u - ca.fmin(ca.fmax(s.u - gradient * span**2, s.u_min), s.u_max)) / span)
+    new_summary = ca.vertcat(
+        summary[0] + ca.dot(gradient * free, step),
+        summary[1] + ca.dot(step, Quu @ step),
+        ca.fmax(summary[2], violation),
+        summary[3] + NU - ca.sum1(free),
+    )
+    return ca.Function(
+        "stage_backward",
+        [s.x, s.u, s.u_before, s.stage, s.theta, damping, P_half, value_gradient, adjoint, summary],
+        [ca.densify(gains), step, _upper(P_before), s_before, adjoint_before, new_summary],
+    )
+
+
+def _forward(structure: Structure) -> ca.Function:
+    N = structure.horizon
+    s = Symbols(structure)
+    x_bar, u_bar, before_bar = ca.SX.sym("x_bar", NX), ca.SX.sym("u_bar", NU), ca.SX.sym("b_bar", NU)
+    K, step, alpha = ca.SX.sym("K", NU, NZ), ca.SX.sym("step", NU), ca.SX.sym("alpha")
+    deviation = ca.vertcat(s.x - x_bar, s.u_before - before_bar)
+    law = u_bar + alpha * step + K @ deviation
+    u = ca.fmin(ca.fmax(law, s.u_min), s.u_max)
+    x_next, cost = ca.substitute([next_state(structure, s), stage_cost(structure, s, False)], [s.u], [u])
+    inner = ca.Function(
+        "stage_forward", [s.x, s.u_before, x_bar, u_bar, before_bar, K, step, alpha, s.stage, s.theta],
+        [x_next, u, cost],
+    )
+    last = ca.Function("terminal_cost", [s.x, s.stage, s.theta], [stage_cost(structure, s, True)])
+
+    x0, u_before, length = ca.MX.sym("x0", NX), ca.MX.sym("u_before", NU), ca.MX.sym("alpha")
+    X, U = ca.MX.sym("X", NX, N + 1), ca.MX.sym("U", NU, N)
+    gains, steps = ca.MX.sym("gains", NU, NZ * N), ca.MX.sym("step", NU, N)
+    stages, theta = ca.MX.sym("stages", structure.stage_size, N + 1), ca.MX.sym("theta", THETA_SIZE)
+    xs, us, data, ks = ca.horzsplit(X), ca.horzsplit(U), ca.horzsplit(stages), ca.horzsplit(gains, NZ)
+    step_k = ca.horzsplit(steps)
+    x, before, before_nominal, total = x0, u_before, u_before, 0
+    X_new, U_new = [x0], []
+    for k in range(N):
+        x, u, cost = inner(x, before, xs[k], us[k], before_nominal, ks[k], step_k[k], length, data[k], theta)
+        before, before_nominal, total = u, us[k], total + cost
+        X_new.append(x)
+        U_new.append(u)
+    total += last(x, data[N], theta)
+    return ca.Function(
+        "forward",
+        [x0, u_before, X, U, gains, steps, length, stages, theta],
+        [ca.horzcat(*X_new), ca.horzcat(*U_new), total],
+        ["x0", "u_before", "X", "U", "gains", "step", "alpha", "stages", "theta"],
+        ["X_new", "U_new", "cost"],
+    )
+
+
+def _upper(P: ca.SX) -> ca.SX:
+    """Return the upper triangle of a symmetric matrix as one dense column, half the storage."""
+    return ca.densify(ca.vertcat(*[P[i, j] for j in range(NZ) for i in range(j + 1)]))
+
+
+def _symmetric(half: ca.SX) -> ca.SX:
+    P = ca.SX(NZ, NZ)
+    index = 0
+    for j in range(NZ):
+        for i in range(j + 1):
+            P[i, j] = half[index]
+            P[j, i] = half[index]
+            index += 1
+    return P
+
+
+def _cholesky(M: ca.SX) -> ca.SX:
+    """Return the lower Cholesky factor of a small positive definite matrix, written out."""
+    n = M.shape[0]
+    L = ca.SX(n, n)
+    for j in range(n):
+        L[j, j] = ca.sqrt(M[j, j] - sum((L[j, i] ** 2 for i in range(j)), ca.SX(0)))
+        for i in range(j + 1, n):
+            L[i, j] = (M[i, j] - sum((L[i, m] * L[j, m] for m in range(j)), ca.SX(0))) / L[j, j]
+    return L
+
+
+def _forward_substitution(L: ca.SX, b: ca.SX) -> ca.SX:
+    rows: List[ca.SX] = []
+    for i in range(L.shape[0]):
+        rows.append((b[i, :] - sum((L[i, m] * rows[m] for m in range(i)), ca.SX(1, b.shape[1]))) / L[i, i])
+    return ca.vertcat(*rows)
+
+
+def _solve(L: ca.SX, b: ca.SX) -> ca.SX:
+    """Return (L L^T)^{-1} b."""
+    y = _forward_substitution(L, b)
+    n = L.shape[0]
+    rows: List[ca.SX] = [None] * n
+    for i in reversed(range(n)):
+        rows[i] = (y[i, :] - sum((L[m, i] * rows[m] for m in range(i + 1, n)), ca.SX(1, b.shape[1]))) / L[i, i]
+    return ca.vertcat(*rows)

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""The compiled backend: projected Gauss-Newton with Riccati sweeps, every iterate feasible.
+
+One iteration is a backward sweep (gradient, active bounds, Newton step with feedback; ``riccati``) and a
+rollout along it, shortened until the cost falls enough (Armijo), with Levenberg damping where no length
+helps. Because dynamics and bounds hold exactly at every iterate, the cost itself is the merit function and
+a solve cut off by its wall-time budget still returns a plan that can be flown.
+"""
+
+import logging
+import time
+from typing import Dict, Optional
+
+import numpy as np
+
+from nmpc_control.compiled_function import Buffered, compile_functions
+from nmpc_control.ocp import Instance, Structure
+from nmpc_control.riccati import NZ, sweeps
+from nmpc_control.solution import Guess, Solution, cold_guess
+from nmpc_control.state import NU
+
+LOGGER = logging.getLogger(__name__)
+_ARMIJO = 1e-4
+_SHORTEST_STEP = 1.0 / 64.0
+_DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
+_RELATIVE_DECREASE = 1e-9  # a smaller predicted change of the cost is rounding
+
+
+class SqpSolver:
+    """Solver of one problem structure; call ``solve`` from one thread at a time."""
+
+    def __init__(self, structure: Structure, tolerance: float, max_iterations: int, time_budget: float) -> None:
+        self.structure = structure
+        self.tolerance, self.max_iterations, self.time_budget = tolerance, max_iterations, time_budget
+        functions = compile_functions(sweeps(structure))
+        self._arrays: Dict[str, np.ndarray] = {}
+        self._backward = Buffered(functions["backward"], self._arrays)
+        self._forward = Buffered(functions["forward"], self._arrays)
+
+    def solve(self, instance: Instance, guess: Optional[Guess] = None) -> Solution:
+        """Return the solution from a guess, or from hover where there is none or it is useless.
+
+        Args:
+            instance: the numbers of the problem.
+            guess: e.g. the last solution, shifted.
+        """
+        start = time.perf_counter()
+        a = self._arrays
+        a["x0"][:, 0], a["u_before"][:, 0] = instance.x0, instance.u_before
+        a["stages"][:], a["theta"][:, 0] = instance.stages, instance.theta
+        cost = self._begin(guess, instance)
+        damping, iterations, status, residual, active = 0.0, 0, "failed", np.inf, 0
+        while np.isfinite(cost):
+            a["damping"][0, 0] = damping
+            self._backward()
+            slope, curvature, residual, active = a["summary"][:, 0]
+            if residual <= self.tolerance:
+                status = "converged"
+                break
+            if iterations >= self.max_iterations or time.perf_counter() - start > self.time_budget:
+                status = "budget"
+                break
+            iterations += 1
+            new_cost = self._search(cost, slope)
+            if new_cost is not None:
+                cost, damping = new_cost, damping / _DAMPING_FACTOR if damping > _DAMPING_FIRST else 0.0
+            elif slope > -_RELATIVE_DECREASE * (1.0 + abs(cost)) or damping >= _DAMPING_LAST:
+                status = "stalled"
+                break
+            else:
+                damping = max(damping * _DAMPING_FACTOR, _DAMPING_FIRST)
+        return Solution(
+            found=bool(np.isfinite(cost)),
+            status=status,
+            states=a["X"].T.copy(),
+            inputs=a["U"].T.copy(),
+            cost=float(cost),
+            iterations=iterations,
+            kkt_residual=float(residual),
+            active_bounds=int(active),
+            solve_time=time.perf_counter() - start,
+            gains=a["gains"].T.reshape(-1, NZ, NU).transpose(0, 2, 1).copy(),
+        )
+
+    def _begin(self, guess: Optional[Guess], instance: Instance) -> float:
+        """Roll the guess out from x0; fall back to hover when that is not finite. Returns the cost."""
+        for candidate in (guess, cold_guess(instance.x0, self.structure.horizon)):
+            if candidate is None or not np.all(np.isfinite(candidate.inputs)):
+                continue
+            a = self._arrays
+            a["X"][:], a["U"][:] = candidate.states.T, candidate.inputs.T
+            if candidate.gains is None:
+                a["gains"][:] = 0.0
+            else:
+                a["gains"][:] = candidate.gains.transpose(0, 2, 1).reshape(-1, NU).T
+            a["alpha"][0, 0] = 0.0
+            self._forward()
+            cost = float(a["cost"][0, 0])
+            if np.isfinite(cost):
+                self._accept()
+                return cost
+        return np.inf
+
+    def _search(self, cost: float, slope: float) -> Optional[float]:
+        """Take the longest of the tried steps that lowers the cost enough; None when there is none."""
+        alpha = 1.0
+        while alpha >= _SHORTEST_STEP:
+            self._arrays["alpha"][0, 0] = alpha
+            self._forward()
+            new_cost = float(self._arrays["cost"][0, 0])
+            if new_cost <= cost + _ARMIJO * alpha * slope:
+                self._accept()
+                return new_cost
+            alpha /= 2.0
+        return None
+
+    def _accept(self) -> None:
+        a = self._arrays
+        a["X"][:], a["U"][:] = a["X_new"], a["U_new"]
