@@ -3,6 +3,7 @@
 
 import dataclasses
 import math
+import re
 from pathlib import Path
 from typing import Any, Dict, Tuple, Type, TypeVar, Union, get_type_hints
 
@@ -33,6 +34,11 @@ class _UniqueKeyLoader(yaml.SafeLoader):
             if keys.count(key) > 1:
                 raise yaml.constructor.ConstructorError(None, None, f"key {key!r} given twice", node.start_mark)
         return super().construct_mapping(node, deep)
+
+
+_UniqueKeyLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+$"), list("-+0123456789")
+)
 
 
 def load_yaml(path: Union[str, Path]) -> Dict[str, Any]:

@@ -54,7 +54,7 @@ class IpoptSolver:
         z = np.asarray(result["x"]).ravel()
         inputs = z[free_states:].reshape(N, NU)
         multipliers = np.asarray(result["lam_x"]).ravel()[free_states:]
-        defect = float(np.max(np.abs(result["g"])))
+        defect = float(np.max(np.abs(np.asarray(result["g"]))))
         status = str(stats["return_status"])
         return Solution(
             found=bool(np.all(np.isfinite(z)) and defect < 1e-3),

@@ -28,12 +28,17 @@ class Nmpc:
         self._last: Optional[Solution] = None
         self._last_t = 0.0
         self._disturbance = np.zeros(3)
-        self._theta = self._pack_theta()
+        self._theta = self._pack_theta(parameters)
 
     def use(self, parameters: Parameters) -> None:
-        """Take over other weights, limits, avoidance or vehicle from the next solve on; the structure stays."""
-        self.parameters = replace(parameters, solver=self.parameters.solver)
-        self._theta = self._pack_theta()
+        """Take over other weights, limits, avoidance or vehicle from the next solve on; the structure stays.
+
+        Raises:
+            ProblemError: unusable numbers; the old parameters remain in force.
+        """
+        parameters = replace(parameters, solver=self.parameters.solver)
+        self._theta = self._pack_theta(parameters)
+        self.parameters = parameters
 
     def reset(self) -> None:
         """Forget the last solution: the next solve starts from hover."""
@@ -85,8 +90,7 @@ class Nmpc:
             kkt_residual=solution.kkt_residual,
         )
 
-    def _pack_theta(self) -> np.ndarray:
-        p = self.parameters
+    def _pack_theta(self, p: Parameters) -> np.ndarray:
         return pack_theta(p.vehicle, p.weights, p.limits, p.avoidance, self._disturbance)
 
     def _guess(self, t: float) -> Optional[Guess]:

@@ -83,6 +83,14 @@ class Limits:
     input_max: np.ndarray = _array(4)  # (4,)
 
 
+    def within(self, vehicle: Vehicle) -> "Limits":
+        """Return the limits that the vehicle can really follow: its thrust range, its tilt limit on each axis."""
+        thrust_map, tilt = vehicle.thrust_map, vehicle.tilt_limit
+        low = np.array([thrust_map.thrust(thrust_map.minimum), -tilt, -tilt, -np.inf])
+        high = np.array([thrust_map.thrust(thrust_map.maximum), tilt, tilt, np.inf])
+        return Limits(np.maximum(self.input_min, low), np.minimum(self.input_max, high))
+
+
 @dataclass(frozen=True)
 class Avoidance:
     """Repulsive potential of Eq. 8, with the distance counted from the hull."""
@@ -163,4 +171,5 @@ class _File:
     flight: Flight
 
     def with_presets(self, vehicle: Vehicle, weights: Weights) -> Parameters:
-        return Parameters(vehicle, weights, self.limits, self.avoidance, self.solver, self.flight)
+        limits = self.limits.within(vehicle)
+        return Parameters(vehicle, weights, limits, self.avoidance, self.solver, self.flight)

@@ -112,7 +112,7 @@ def _stage_backward(structure: Structure) -> ca.Function:
     span = s.u_max - s.u_min
     violation = ca.mmax(ca.fabs(s.u - ca.fmin(ca.fmax(s.u - gradient * span**2, s.u_min), s.u_max)) / span)
     new_summary = ca.vertcat(
-        summary[0] + ca.dot(gradient * free, step),
+        summary[0] + ca.dot(free * qu, step),  # qu is the gradient under the feedback of the later stages
         summary[1] + ca.dot(step, Quu @ step),
         ca.fmax(summary[2], violation),
         summary[3] + NU - ca.sum1(free),

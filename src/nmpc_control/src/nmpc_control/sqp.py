@@ -23,7 +23,8 @@ LOGGER = logging.getLogger(__name__)
 _ARMIJO = 1e-4
 _SHORTEST_STEP = 1.0 / 64.0
 _DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
-_RELATIVE_DECREASE = 1e-9  # a smaller predicted change of the cost is rounding
+_DECREASE = 1e-3  # times tolerance: a smaller predicted change of the cost, relative, counts as none
+_ROUNDING = 1e-9  # a smaller predicted change, relative, is rounding
 
 
 class SqpSolver:
@@ -54,7 +55,7 @@ class SqpSolver:
             a["damping"][0, 0] = damping
             self._backward()
             slope, curvature, residual, active = a["summary"][:, 0]
-            if residual <= self.tolerance:
+            if residual <= self.tolerance or -slope <= _DECREASE * self.tolerance * (1.0 + abs(cost)):
                 status = "converged"
                 break
             if iterations >= self.max_iterations or time.perf_counter() - start > self.time_budget:
@@ -64,7 +65,7 @@ class SqpSolver:
             new_cost = self._search(cost, slope)
             if new_cost is not None:
                 cost, damping = new_cost, damping / _DAMPING_FACTOR if damping > _DAMPING_FIRST else 0.0
-            elif slope > -_RELATIVE_DECREASE * (1.0 + abs(cost)) or damping >= _DAMPING_LAST:
+            elif slope > -_ROUNDING * (1.0 + abs(cost)) or damping >= _DAMPING_LAST:
                 status = "stalled"
                 break
             else:

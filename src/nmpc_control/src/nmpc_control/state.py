@@ -7,6 +7,7 @@ reference [rad/s]; body frame FLU, so positive pitch is nose down.
 """
 
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import Optional
 
 import numpy as np
@@ -37,6 +38,14 @@ def hover_state(position: np.ndarray, yaw: float = 0.0) -> np.ndarray:
     x[POSITION] = position
     x[YAW] = yaw
     return x
+
+
+class Goal(IntEnum):
+    """What a plan serves: values of ``nmpc_msgs/Plan.GOAL_*``."""
+
+    HOLD = 0
+    APPROACH = 1
+    TRAJECTORY = 2
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+# Everything sets itself up: `make fly` and `make test` are all that a fresh machine needs.
+SHELL := /bin/bash
+MAKEFLAGS += --no-print-directory
+export SCENARIO ?= multi_obstacle
+export PLANT ?= dji_hil
+export SPEED ?= 1.0
+RVIZ ?=
+in_workspace := . devel/setup.bash &&
+single_thread := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+.PHONY: help build fly test lint clean
+
+help:
+	@echo "make fly [SCENARIO=multi_obstacle] [PLANT=dji_hil] [SPEED=1.0] [RVIZ=1]   fly in the simulator, record, report"
+	@echo "make test [PYTEST_ARGS=...]   everything that continuous integration runs"
+	@echo "make build   system packages, Python packages and the workspace, as far as they are missing"
+	@echo "make lint    ruff and catkin_lint"
+	@echo "make clean   remove what was built; virtual environments and bags stay"
+
+build:
+	@.setup/system.sh
+	@.setup/python.sh .venv /usr/bin/python3 --system-site-packages
+	@.setup/workspace.sh
+
+fly: build
+	@$(in_workspace) rosrun uav_sim fly "$$SCENARIO" --plant "$$PLANT" --speed "$$SPEED" $(if $(filter-out 0,$(RVIZ)),--rviz)
+
+test: lint
+	@.setup/system.sh test.txt
+	@$(single_thread) .setup/python38.sh
+	@$(in_workspace) $(single_thread) .venv/bin/python3 -m pytest tests $(PYTEST_ARGS)
+
+lint: build
+	@.venv/bin/ruff check --quiet --output-format concise .
+	@.venv/bin/ruff format --quiet --check .
+	@$(in_workspace) .venv/bin/catkin_lint -W2 --strict --offline src
+
+clean:
+	@rm -rf build devel install logs .pytest_cache .ruff_cache

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Offline analysis of recorded and simulated flights; needs no ROS."""

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""Distance between the flown path and the reference, and the moment of arrival."""
+
+from typing import Optional
+
+import numpy as np
+
+from nmpc_control.analysis.record import Reference, Series
+
+ARRIVAL_DISTANCE = 0.3  # [m] from the end of the reference
+ARRIVAL_SPEED = 0.2  # [m/s]
+_BLOCK = 2_000_000  # point-segment pairs that are held in memory at a time
+
+
+def errors(position: Series, reference: Reference, start: float, end: float) -> Series:
+    """Return position minus the reference at the same time (n, 3) [m], from start to end [s]."""
+    flown = position.between(start, end)
+    return Series(flown.times, flown.values - reference.position_at(flown.times))
+
+
+def path_deviation(points: np.ndarray, curve: np.ndarray) -> np.ndarray:
+    """Return the distance [m] of points (n, 3) to the nearest point of a polyline (m, 3)."""
+    if len(curve) < 2:
+        return np.linalg.norm(points - curve[0], axis=1)
+    starts, steps = curve[:-1], np.diff(curve, axis=0)
+    squared = np.maximum(np.einsum("ij,ij->i", steps, steps), np.finfo(float).tiny)
+    distances = np.empty(len(points))
+    block = max(1, _BLOCK // len(steps))
+    for first in range(0, len(points), block):
+        offsets = points[first : first + block, None, :] - starts
+        along = np.clip(np.einsum("nij,ij->ni", offsets, steps) / squared, 0.0, 1.0)
+        offsets -= along[:, :, None] * steps
+        nearest = np.einsum("nij,nij->ni", offsets, offsets).min(axis=1)
+        distances[first : first + block] = np.sqrt(nearest)
+    return distances
+
+
+def arrival_time(
+    position: Series, velocity: Series, reference: Reference, end: float
+) -> Optional[float]:
+    """Return when the aircraft came to the end of the reference, closer and slower than the limits.
+
+    A closed path begins where it ends, so arrival counts only once the reference itself has come
+    to its end for good; for one that never leaves it (hover) that is when its time is over.
+
+    Args:
+        position: Estimate (n, 3) [m].
+        velocity: Estimate (n, 3) [m/s].
+        reference: What was to be flown.
+        end: Last moment [s] that counts.
+
+    Returns:
+        Time [s] on the flight's clock, or None.
+    """
+    goal = reference.path.values[-1]
+    away = np.linalg.norm(reference.path.values - goal, axis=1) >= ARRIVAL_DISTANCE
+    last_away = np.flatnonzero(away)
+    earliest = reference.path.times[last_away[-1]] if len(last_away) else reference.duration
+    flown = position.between(reference.start + earliest, end)
+    near = np.linalg.norm(flown.values - goal, axis=1) < ARRIVAL_DISTANCE
+    slow = np.linalg.norm(velocity.at(flown.times), axis=1) < ARRIVAL_SPEED
+    arrived = np.flatnonzero(near & slow)
+    return float(flown.times[arrived[0]]) if len(arrived) else None

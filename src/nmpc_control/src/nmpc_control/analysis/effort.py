@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT
+"""What a flight cost: solver, command stream and motion."""
+
+import math
+from typing import List, Optional
+
+import numpy as np
+
+from nmpc_control.analysis.record import (
+    DEADLINE_MISSES,
+    FOUND,
+    ITERATIONS,
+    PLANS_REJECTED,
+    SOLVE_TIME,
+    FlightRecord,
+    Metrics,
+    Series,
+)
+from nmpc_control.analysis.windows import Window, mode_runs
+from nmpc_control.mode_inputs import STREAMING
+from nmpc_control.state import THRUST
+
+_SOLVER_FIGURES = (
+    "solver_iterations_mean",
+    "solve_time_ms",
+    "plans_found_ratio",
+    "plans_rejected",
+    "deadline_misses",
+)
+_COMMAND_FIGURES = (
+    "thrust_percent",
+    "command_rate_hz",
+    "command_gap_ms_max",
+    "command_gap_ms_p99",
+)
+_MOTION_FIGURES = ("airborne_time_s", "path_length_m", "speed_m_s", "tilt_rad")
+
+
+def solver_figures(record: FlightRecord, window: Optional[Window], missing: List[str]) -> Metrics:
+    """Return iterations and solve times of the plans in the window."""
+    figures: Metrics = dict.fromkeys(_SOLVER_FIGURES)
+    status = _within(record.status, window)
+    if len(status):
+        counted = status[-1] - status[0]
+        figures["plans_rejected"] = int(counted[PLANS_REJECTED])
+        figures["deadline_misses"] = int(counted[DEADLINE_MISSES])
+    else:
+        missing.append("no status of the guard: no count of rejected plans and deadline misses")
+    plans = _within(record.solver, window)
+    if not len(plans):
+        missing.append("no solver results in the evaluated time: no iterations and no solve times")
+        return figures
+    milliseconds = 1e3 * plans[:, SOLVE_TIME]
+    figures["solver_iterations_mean"] = plans[:, ITERATIONS].mean()
+    figures["plans_found_ratio"] = plans[:, FOUND].mean()
+    figures["solve_time_ms"] = {
+        "mean": milliseconds.mean(),
+        "p50": np.percentile(milliseconds, 50),
+        "p99": np.percentile(milliseconds, 99),
+        "max": milliseconds.max(),
+    }
+    return figures
+
+
+def command_figures(record: FlightRecord, window: Optional[Window], missing: List[str]) -> Metrics:
+    """Return thrust range in the window, rate and gaps of the command stream."""
+    figures: Metrics = dict.fromkeys(_COMMAND_FIGURES)
+    if record.commands is None or window is None:
+        missing.append("no commands: no thrust range, command rate or gaps")
+        return figures
+    thrust = _within(record.commands, window)[:, THRUST]
+    thrust = thrust[np.isfinite(thrust)]
+    if len(thrust):
+        figures["thrust_percent"] = [thrust.min(), thrust.max()]
+    else:
+        missing.append("no command with thrust in the evaluated time: no thrust range")
+    gaps = command_gaps(record, window)
+    if len(gaps):
+        figures["command_rate_hz"] = len(gaps) / max(gaps.sum(), 1e-9)
+        figures["command_gap_ms_max"] = 1e3 * gaps.max()
+        figures["command_gap_ms_p99"] = 1e3 * np.percentile(gaps, 99)
+    else:
+        missing.append("no two commands while automatic flight was on: no command rate or gaps")
+    return figures
+
+
+def command_gaps(record: FlightRecord, window: Window) -> np.ndarray:
+    """Return the times [s] between successive commands while the guard streams.
+
+    Without the guard's status, all commands in the window count.
+    """
+    periods = [(window.start, window.end)]
+    if record.status is not None:
+        first, last = record.automatic or (-math.inf, math.inf)
+        streaming = mode_runs(record.status, STREAMING)
+        periods = [(start, end) for start, end in streaming if first <= start and end <= last]
+    gaps = [np.diff(record.commands.between(start, end).times) for start, end in periods]
+    return np.concatenate(gaps) if gaps else np.zeros(0)
+
+
+def motion_figures(record: FlightRecord, window: Optional[Window], missing: List[str]) -> Metrics:
+    """Return time in the air, length, speed and tilt in the window."""
+    figures: Metrics = dict.fromkeys(_MOTION_FIGURES)
+    if record.airborne is None:
+        missing.append("nothing says when the aircraft was in the air: no airborne time")
+    else:
+        figures["airborne_time_s"] = record.airborne[1] - record.airborne[0]
+    if window is None:
+        return figures
+    if record.position is None:
+        missing.append("no positions: no path length")
+    else:
+        steps = np.diff(_within(record.position, window), axis=0)
+        figures["path_length_m"] = np.linalg.norm(steps, axis=1).sum() if len(steps) else None
+    velocity, attitude = _within(record.velocity, window), _within(record.attitude, window)
+    if len(velocity):
+        speed = np.linalg.norm(velocity, axis=1)
+        figures["speed_m_s"] = {"mean": speed.mean(), "max": speed.max()}
+    if len(attitude):
+        tilt = np.arccos(np.cos(attitude[:, 0]) * np.cos(attitude[:, 1]))
+        figures["tilt_rad"] = {"mean": tilt.mean(), "max": tilt.max()}
+    return figures
+
+
+def _within(series: Optional[Series], window: Optional[Window]) -> np.ndarray:
+    """Return the values in the window; none where there is no series or no window."""
+    if series is None or window is None:
+        return np.zeros((0, 1))
+    return series.between(window.start, window.end).values

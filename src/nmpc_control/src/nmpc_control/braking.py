@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""Bounded brake from measured velocity, for when there is neither a plan nor DJI's own hold."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Optional, Sequence
+
+import numpy as np
+
+from nmpc_control.params import Limits, Vehicle
+from nmpc_control.state import GRAVITY, POSITION, VELOCITY, YAW, hover_input
+
+
+def _positive() -> float:
+    return field(metadata={"min": 1e-6})
+
+
+def _non_negative() -> float:
+    return field(metadata={"min": 0.0})
+
+
+@dataclass(frozen=True)
+class BrakeParameters:
+    """Gains and bounds of the brake; deceleration is proportional to velocity up to its bound."""
+
+    velocity_gain: float = _positive()  # [1/s] horizontal
+    position_gain: float = _non_negative()  # [1/s^2] horizontal, towards where it came to rest
+    vertical_velocity_gain: float = _positive()  # [1/s]
+    vertical_position_gain: float = _non_negative()  # [1/s^2] towards the height where it began
+    thrust_adaptation: float = _non_negative()  # [1/s^2] integral of vertical velocity
+    deceleration: float = _positive()  # [m/s^2] horizontal, at most
+    vertical_acceleration: float = _positive()  # [m/s^2] at most, adaptation included
+    tilt_rate: float = _positive()  # [rad/s] of each attitude reference, at most
+    rest_speed: float = _positive()  # [m/s] horizontal; below it the position is held
+
+
+class Brake:
+    """A brake that remembers where it came to rest, how much thrust it needs and what it sent."""
+
+    def __init__(self, vehicle: Vehicle, limits: Limits, params: BrakeParameters) -> None:
+        """Begin level, in hover thrust."""
+        self.vehicle = vehicle
+        self.limits = limits
+        self.params = params
+        self.begin(hover_input())
+
+    def begin(self, previous: Sequence[float]) -> None:
+        """Start a new brake after the input (4,) that was sent last."""
+        self._previous = np.array(previous, dtype=float)
+        self._rest: Optional[np.ndarray] = None
+        self._height: Optional[float] = None
+        self._thrust_bias = 0.0
+
+    def input(self, state: np.ndarray, dt: float, has_position: bool) -> np.ndarray:
+        """Return the input (4,) that brakes and, once at rest, holds.
+
+        Args:
+            state: (10,) expected when the input takes effect.
+            dt: [s] since the last call.
+            has_position: whether the position in the state is to be trusted.
+        """
+        p = self.params
+        position, velocity = state[POSITION], state[VELOCITY]
+        horizontal = -p.velocity_gain * velocity[:2]
+        vertical = -p.vertical_velocity_gain * velocity[2]
+        self._thrust_bias -= p.thrust_adaptation * velocity[2] * dt
+        if has_position:
+            horizontal = horizontal + p.position_gain * (
+                self._resting_place(state)[:2] - position[:2]
+            )
+            vertical += p.vertical_position_gain * (self._height - position[2])
+        else:
+            self._rest = self._height = None
+        horizontal = _shorten(horizontal, p.deceleration)
+        bound = p.vertical_acceleration
+        self._thrust_bias = min(max(self._thrust_bias, -bound), bound)
+        vertical = min(max(vertical + self._thrust_bias, -bound), bound)
+        self._previous = self._limited(
+            self._thrust_vector_input(horizontal, vertical, state[YAW]), dt
+        )
+        return self._previous.copy()
+
+    def _resting_place(self, state: np.ndarray) -> np.ndarray:
+        position, velocity = state[POSITION], state[VELOCITY]
+        if self._height is None:
+            self._height = float(position[2])
+        if self._rest is None and math.hypot(velocity[0], velocity[1]) <= self.params.rest_speed:
+            self._rest = position.copy()
+        return position if self._rest is None else self._rest
+
+    def _thrust_vector_input(
+        self, horizontal: np.ndarray, vertical: float, yaw: float
+    ) -> np.ndarray:
+        """Return the input (4,) whose thrust vector gives the acceleration, Eq. 1 solved for it."""
+        forward = math.cos(yaw) * horizontal[0] + math.sin(yaw) * horizontal[1]
+        left = -math.sin(yaw) * horizontal[0] + math.cos(yaw) * horizontal[1]
+        up = GRAVITY + vertical
+        thrust = math.sqrt(forward * forward + left * left + up * up)
+        roll = math.asin(-left / thrust) / self.vehicle.roll.gain
+        pitch = math.atan2(forward, up) / self.vehicle.pitch.gain
+        return np.array([thrust, roll, pitch, 0.0])
+
+    def _limited(self, u: np.ndarray, dt: float) -> np.ndarray:
+        u = np.clip(u, self.limits.input_min, self.limits.input_max)
+        change = self.params.tilt_rate * dt
+        u[1:3] = np.clip(u[1:3], self._previous[1:3] - change, self._previous[1:3] + change)
+        return u
+
+
+def _shorten(vector: np.ndarray, limit: float) -> np.ndarray:
+    norm = math.hypot(vector[0], vector[1])
+    return vector if norm <= limit else vector * (limit / norm)

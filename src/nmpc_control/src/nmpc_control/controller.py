@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""One control step, in the order in which data flows: estimate, delay, reference, obstacles, solve."""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Deque, Optional, Sequence, Tuple
+
+import numpy as np
+
+from nmpc_control.estimator import Estimator, StateEstimate
+from nmpc_control.itinerary import Itinerary
+from nmpc_control.nmpc import Nmpc
+from nmpc_control.params import Parameters
+from nmpc_control.prediction import predict
+from nmpc_control.state import POSITION, VELOCITY, YAW, Goal, Obstacle, Plan, hover_input
+
+_INPUT_MEMORY = 2.0  # [s] inputs older than this cannot matter for the delay
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one control step produced."""
+
+    estimate: StateEstimate
+    reference: np.ndarray  # (10,) at the time of the estimate
+    stage_references: np.ndarray  # (N + 1, 10)
+    plan: Plan
+    goal: Goal
+    reference_time: float  # [s] clock of the trajectory at stage 0; NaN while none is flown
+    clearance: float  # [m] hull to the nearest obstacle's surface, now; inf without obstacles
+    predicted_clearance: float  # [m] the same, least over the plan
+
+    @property
+    def deviation(self) -> float:
+        """Distance [m] of the estimate from the reference at the same time."""
+        return float(np.linalg.norm(self.estimate.vector[POSITION] - self.reference[POSITION]))
+
+
+class Controller:
+    """Estimator, itinerary and optimiser behind one ``step(t)``; telemetry and obstacles come in between."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self.estimator = Estimator()
+        self.itinerary = Itinerary(parameters.flight)
+        self.nmpc = Nmpc(parameters)
+        self.obstacles: Sequence[Obstacle] = ()
+        self.engaged = False  # the guard flies these plans
+        self._inputs: Deque[Tuple[float, np.ndarray]] = deque()
+
+    def use(self, parameters: Parameters) -> None:
+        """Take over other weights, limits or margins from the next step on."""
+        self.parameters = parameters
+        self.nmpc.use(parameters)
+
+    def record_input(self, t: float, u: np.ndarray) -> None:
+        """Remember the input (4,) that was really sent at time ``t`` [s]."""
+        if not np.all(np.isfinite(u)):
+            return
+        self._inputs.append((t, np.array(u, dtype=float)))
+        while self._inputs[0][0] < t - _INPUT_MEMORY:
+            self._inputs.popleft()
+
+    def step(self, t: float) -> Optional[Step]:
+        """Return the plan to be commanded from ``t`` [s] on, or None while the state is missing or stale."""
+        estimate = self.estimator.estimate(t)
+        if estimate is None or estimate.age > self.parameters.flight.state_timeout:
+            self.nmpc.reset()
+            return None
+        x = estimate.vector
+        if not self.engaged:
+            self.itinerary.hold(x[POSITION], x[YAW], "automatic flight ended")
+        self.itinerary.update(t, x[POSITION], x[VELOCITY])
+
+        x0 = predict(x, t, t + self.parameters.vehicle.delay, self._inputs, self.parameters.vehicle)
+        times = self.nmpc.stage_times(t)
+        references = self.itinerary.reference(times)
+        plan = self.nmpc.solve(t, x0, references, self._input_before(t), self.obstacles)
+        return Step(
+            estimate=estimate,
+            reference=self.itinerary.reference(np.array([t]))[0],
+            stage_references=references,
+            plan=plan,
+            goal=self.itinerary.goal,
+            reference_time=self.itinerary.reference_time(times[0]),
+            clearance=self._clearance(x[None, POSITION], np.array([t])),
+            predicted_clearance=self._clearance(plan.states[:, POSITION], times),
+        )
+
+    def _input_before(self, t: float) -> np.ndarray:
+        """Return the input (4,) in force before ``t``: the last one sent, hover where none is recent."""
+        if self._inputs and t - self._inputs[-1][0] < _INPUT_MEMORY:
+            return self._inputs[-1][1]
+        return hover_input()
+
+    def _clearance(self, positions: np.ndarray, times: np.ndarray) -> float:
+        """Return the least distance [m] from hull to surface for positions (M, 3) at times (M,)."""
+        radius = self.parameters.vehicle.radius
+        distances = [
+            np.min([obstacle.distance(p, s) for p, s in zip(positions, times)]) - radius
+            if obstacle.stamp is not None
+            else np.min(obstacle.distance(positions)) - radius
+            for obstacle in self.obstacles
+        ]
+        return float(min(distances, default=np.inf))

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""The way that was flown, bounded in size however long the flight lasts."""
+
+from typing import List, Optional, Tuple
+
+import numpy as np
+
+
+class FlownPath:
+    """Positions at least a spacing apart, and those at every few seconds of a clock.
+
+    When either is full, every second entry goes and the spacing or the period doubles.
+    """
+
+    def __init__(
+        self, spacing: float = 0.05, capacity: int = 2000, period: float = 5.0, labels: int = 60
+    ) -> None:
+        self._first_spacing, self._capacity = spacing, capacity  # [m], [1]
+        self._first_period, self._label_capacity = period, labels  # [s], [1]
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything, also the clock."""
+        self._spacing = self._first_spacing
+        self._points: List[np.ndarray] = []
+        self._last: Optional[np.ndarray] = None
+        self.start_clock(None)
+
+    def start_clock(self, t: Optional[float]) -> None:
+        """Count the labels from a time [s]; None: no labels."""
+        self._clock_start, self._period = t, self._first_period
+        self.labels: List[Tuple[float, np.ndarray]] = []  # ([s] on the clock, (3,) [m])
+
+    def add(self, t: float, position: np.ndarray) -> None:
+        """Take note of a position (3,) [m] at a time [s]."""
+        self._last = position
+        if not self._points or np.linalg.norm(position - self._points[-1]) >= self._spacing:
+            self._points.append(position)
+            if len(self._points) > self._capacity:
+                self._points, self._spacing = self._points[::2], 2 * self._spacing
+        if self._clock_start is None:
+            return
+        due = self.labels[-1][0] + self._period if self.labels else 0.0
+        if t - self._clock_start >= due:
+            self.labels.append((due, position))
+            if len(self.labels) > self._label_capacity:
+                self.labels, self._period = self.labels[::2], 2 * self._period
+
+    @property
+    def points(self) -> np.ndarray:
+        """Positions (n, 3) [m], the newest last."""
+        newest = [] if self._last is None else [self._last]
+        return np.array(self._points + newest).reshape(-1, 3)

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""Parameters of the guard; values live in ``config/guard.yaml``, here is what they mean."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Optional
+
+from nmpc_control.braking import BrakeParameters
+from nmpc_control.config import config_directory, from_dict, load_yaml
+from nmpc_control.dji import SetpointLimits, Switch
+from nmpc_control.mode_inputs import ModeParameters
+from nmpc_control.plan_check import PlanCheckParameters
+
+
+def _positive() -> float:
+    return field(metadata={"min": 1e-3})
+
+
+@dataclass(frozen=True)
+class GuardParameters:
+    """Everything the guard needs beside vehicle and input limits."""
+
+    rate: float = field(metadata={"min": 10.0, "max": 50.0})  # [Hz] of commands
+    world_frame: str = field()  # frame of plans and obstacles
+    position_source: str = field(metadata={"choices": ("gps", "external")})
+    vertical_command: str = field(metadata={"choices": ("thrust", "velocity")})
+    hold_timeout: float = _positive()  # [s] in which the controller must obey `hover`
+    reference_retry: float = _positive()  # [s] between requests for a local position reference
+    height_speed: float = _positive()  # [m/s] below it a height counts as steady
+    rc_switch: Switch = field()
+    setpoint_limits: SetpointLimits = field()
+    modes: ModeParameters = field()
+    plan_check: PlanCheckParameters = field()
+    brake: BrakeParameters = field()
+
+
+def load_guard_parameters(directory: Optional[Path] = None) -> GuardParameters:
+    """Return the parameters of ``config/guard.yaml``; raises ConfigError."""
+    path = (directory or config_directory()) / "guard.yaml"
+    return from_dict(GuardParameters, load_yaml(path), path.name)

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""Where the aircraft should be when: hold, approach a start, fly a trajectory, hold its end."""
+
+from dataclasses import dataclass
+from typing import Optional, Tuple
+
+import numpy as np
+
+from nmpc_control.params import Flight
+from nmpc_control.state import NX, POSITION, VELOCITY, YAW, YAW_RATE, Goal
+from nmpc_control.trajectory import Trajectory, approach
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a goal ended."""
+
+    arrived: bool
+    message: str
+
+
+class Itinerary:
+    """Sequence of references; ``update`` moves it on, ``reference`` samples it, nothing asks for the time."""
+
+    def __init__(self, flight: Flight) -> None:
+        self.flight = flight
+        self.goal = Goal.HOLD
+        self.outcome: Optional[Outcome] = None  # of the last goal; None while one is pursued
+        self.trajectory: Optional[Trajectory] = None  # the one that is flown or approached
+        self.clock_start: Optional[float] = None  # [s] time at which the trajectory's clock began
+        self._hold: Tuple[np.ndarray, float] = (np.zeros(3), 0.0)
+        self._leg: Optional[Trajectory] = None
+        self._leg_start = 0.0
+        self._settled_since: Optional[float] = None
+
+    def hold(self, position: np.ndarray, yaw: float, message: str = "told to hold") -> None:
+        """Hold a position (3,) [m] and yaw [rad]; a goal that was pursued ends without arrival."""
+        if self.goal is not Goal.HOLD:
+            self._end(False, message)
+        self._hold = (np.array(position, dtype=float), float(yaw))
+
+    def go_to(self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float) -> None:
+        """Fly straight from a position (3,) [m] to a target (3,) [m], rest to rest, and hold there."""
+        self._set_out(t, position, yaw, np.asarray(target, dtype=float), target_yaw)
+        self.trajectory = None
+
+    def fly(self, t: float, position: np.ndarray, yaw: float, trajectory: Trajectory) -> None:
+        """Fly from a position (3,) [m] to a trajectory's start, settle there, then fly the trajectory."""
+        first = trajectory.sample(np.zeros(1))
+        self._set_out(t, position, yaw, first.position[0], float(first.yaw[0]))
+        self.trajectory = trajectory
+
+    def begin(self, t: float, trajectory: Trajectory) -> None:
+        """Start the trajectory's clock at ``t`` [s] wherever the aircraft is."""
+        self.goal, self.outcome = Goal.TRAJECTORY, None
+        self.trajectory, self.clock_start = trajectory, t
+
+    def update(self, t: float, position: np.ndarray, velocity: np.ndarray) -> None:
+        """Move on with the position (3,) [m] and velocity (3,) [m/s] at time ``t`` [s]."""
+        if self.goal is Goal.HOLD:
+            return
+        target = self._target()
+        near = np.linalg.norm(position - target) < self.flight.arrival_distance
+        at_rest = near and np.linalg.norm(velocity) < self.flight.arrival_speed
+        if self.goal is Goal.APPROACH:
+            self._update_approach(t, bool(at_rest))
+        elif t >= self.clock_start + self.trajectory.duration:
+            if at_rest:
+                self._finish("arrived")
+            elif t > self.clock_start + self.trajectory.duration + self.flight.arrival_timeout:
+                self._finish("the trajectory's time is over, its end was not reached", arrived=False)
+
+    def reference(self, times: np.ndarray) -> np.ndarray:
+        """Return the reference states (M, 10) at times (M,) [s]; roll and pitch are zero."""
+        x = np.zeros((len(times), NX))
+        if self.goal is Goal.HOLD:
+            x[:, POSITION], x[:, YAW] = self._hold
+            return x
+        if self.goal is Goal.APPROACH:
+            sample = self._leg.sample(times - self._leg_start)
+        else:
+            sample = self.trajectory.sample(times - self.clock_start)
+        x[:, POSITION], x[:, VELOCITY] = sample.position, sample.velocity
+        x[:, YAW], x[:, YAW_RATE] = sample.yaw, sample.yaw_rate
+        return x
+
+    def reference_time(self, t: float) -> float:
+        """Return the clock of the trajectory [s] at ``t``; NaN while none is flown."""
+        return t - self.clock_start if self.goal is Goal.TRAJECTORY else float("nan")
+
+    def progress(self, t: float) -> float:
+        """Return the part 0..1 of the trajectory's time that has passed at ``t`` [s]."""
+        if self.goal is not Goal.TRAJECTORY:
+            return 0.0
+        return float(np.clip((t - self.clock_start) / max(self.trajectory.duration, 1e-9), 0.0, 1.0))
+
+    def _set_out(self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float) -> None:
+        self.goal, self.outcome, self.clock_start, self._settled_since = Goal.APPROACH, None, None, None
+        self._leg = approach(
+            position, target, self.flight.approach_speed, self.flight.approach_acceleration, yaw, target_yaw
+        )
+        self._leg_start = t
+
+    def _target(self) -> np.ndarray:
+        path = self._leg if self.goal is Goal.APPROACH else self.trajectory
+        return path.sample(np.array([path.duration])).position[0]
+
+    def _update_approach(self, t: float, at_rest: bool) -> None:
+        leg_end = self._leg_start + self._leg.duration
+        if not at_rest or t < leg_end:
+            self._settled_since = None
+            if t > leg_end + self.flight.arrival_timeout:
+                self._finish("the start was not reached in time", arrived=False)
+            return
+        self._settled_since = t if self._settled_since is None else self._settled_since
+        if t - self._settled_since < self.flight.settle_time:
+            return
+        if self.trajectory is None:
+            self._finish("arrived")
+        else:
+            self.begin(t, self.trajectory)
+
+    def _finish(self, message: str, arrived: bool = True) -> None:
+        path = self._leg if self.goal is Goal.APPROACH else self.trajectory
+        last = path.sample(np.array([path.duration]))
+        self._hold = (last.position[0], float(last.yaw[0]))
+        self._end(arrived, message)
+
+    def _end(self, arrived: bool, message: str) -> None:
+        self.goal, self.outcome = Goal.HOLD, Outcome(arrived, message)
+        self._leg, self.clock_start = None, None

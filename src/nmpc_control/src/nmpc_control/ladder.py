@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: MIT
+"""The upper rungs of the ladder: which verified plan is flown now, if any, and why not."""
+
+import math
+from enum import IntEnum
+from typing import Optional, Sequence, Tuple
+
+import numpy as np
+
+from nmpc_control.mode_inputs import Goal
+from nmpc_control.params import Limits, Vehicle
+from nmpc_control.plan_check import (
+    Finding,
+    PlanCheckParameters,
+    Verdict,
+    check_flown,
+    check_plan,
+)
+from nmpc_control.state import Obstacle, Plan
+
+
+class Rung(IntEnum):
+    """Values of ControllerStatus.RUNG_*: what the aircraft is flown on."""
+
+    NONE = 0
+    NEW_PLAN = 1
+    LAST_PLAN = 2
+    BRAKE = 3
+    BRAKE_BLIND = 4
+    RELEASE = 5
+
+
+class PlanLadder:
+    """The last verified plan, and for how long plans have been usable."""
+
+    def __init__(
+        self, params: PlanCheckParameters, hold_timeout: float, vehicle: Vehicle, limits: Limits
+    ) -> None:
+        """Begin without a plan.
+
+        Args:
+            params: of the plan check.
+            hold_timeout: [s] in which plans must turn to holding after ``expect_hold``.
+            vehicle: the guard's own model.
+            limits: bounds of the inputs.
+        """
+        self.params = params
+        self.hold_timeout = hold_timeout
+        self.vehicle = vehicle
+        self.limits = limits
+        self.received = 0  # [1] plans since start-up
+        self.rejected = 0  # [1] of these
+        self.forget()
+
+    def forget(self) -> None:
+        """Drop everything that carries a time; the counts remain."""
+        self.plan: Optional[Plan] = None
+        self.goal = Goal.HOLD
+        self.verified = 0  # [1] in a row
+        self._verdict = Verdict(Finding.NOT_FOUND, "no plan has come")
+        self._is_new = False
+        self._usable_since: Optional[float] = None
+        self._hold_since: Optional[float] = None
+
+    def take(
+        self,
+        plan: Plan,
+        goal: Goal,
+        *,
+        t: float,
+        state: Optional[np.ndarray],
+        inputs: Sequence[Tuple[float, Sequence[float]]],
+        obstacles: Sequence[Obstacle],
+    ) -> None:
+        """Check a plan that has just come; as ``check_plan``, with state None where unknown."""
+        self.received += 1
+        if state is None:
+            self._verdict = Verdict(Finding.JUMP, "the state is not known")
+        else:
+            self._verdict = check_plan(
+                plan,
+                t=t,
+                state=state,
+                inputs=inputs,
+                vehicle=self.vehicle,
+                limits=self.limits,
+                obstacles=obstacles,
+                params=self.params,
+            )
+        if not self._verdict.ok:
+            self.rejected += 1
+            self.verified = 0
+            return
+        self.plan, self.goal, self._is_new = plan, goal, True
+        self.verified += 1
+        if goal is Goal.HOLD:
+            self._hold_since = None
+
+    def refuse(self, sentence: str) -> None:
+        """Count a plan that could not even be read."""
+        self.received += 1
+        self.rejected += 1
+        self.verified = 0
+        self._verdict = Verdict(Finding.SHAPE, sentence)
+
+    def expect_hold(self, t: float) -> None:
+        """Accept plans towards a goal only for ``hold_timeout`` more, until one holds position."""
+        self._hold_since = t
+
+    def stop_expecting(self) -> None:
+        """Accept every goal again."""
+        self._hold_since = None
+
+    def assess(self, t: float, obstacles: Sequence[Obstacle]) -> Tuple[Rung, Verdict]:
+        """Return the rung at ``t`` [s], NONE without a usable plan, and the verdict behind it."""
+        rung, verdict = self._assess(t, obstacles)
+        if rung is Rung.NONE:
+            self._usable_since = None
+        elif self._usable_since is None:
+            self._usable_since = t
+        self._is_new = False
+        return rung, verdict
+
+    def usable_time(self, t: float) -> float:
+        """Return for how long [s] plans have been usable without interruption."""
+        return 0.0 if self._usable_since is None else t - self._usable_since
+
+    def age(self, t: float) -> float:
+        """Return the age [s] of the last verified plan; inf without."""
+        return math.inf if self.plan is None else t - self.plan.t
+
+    def _assess(self, t: float, obstacles: Sequence[Obstacle]) -> Tuple[Rung, Verdict]:
+        if self.plan is None:
+            return Rung.NONE, self._verdict
+        if self._is_new:
+            rung, verdict = Rung.NEW_PLAN, self._verdict
+        else:
+            rung = Rung.LAST_PLAN
+            verdict = check_flown(
+                self.plan, t=t, vehicle=self.vehicle, obstacles=obstacles, params=self.params
+            )
+        if not verdict.ok:
+            self.verified = 0
+            return Rung.NONE, self._with_rejection(verdict)
+        if self._hold_since is not None and t - self._hold_since > self.hold_timeout:
+            sentence = f"the controller did not hold within {self.hold_timeout:g} s"
+            return Rung.NONE, Verdict(Finding.TOO_OLD, sentence, verdict.clearance)
+        return rung, verdict
+
+    def _with_rejection(self, verdict: Verdict) -> Verdict:
+        """Return the verdict on the last verified plan, led by why the newest one was refused."""
+        if self._verdict.ok:
+            return verdict
+        sentence = f"{self._verdict.sentence}, and {verdict.sentence}"
+        return Verdict(self._verdict.finding, sentence, verdict.clearance)

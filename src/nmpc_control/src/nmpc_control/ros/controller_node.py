@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: MIT
+"""ROS node nmpc_controller: estimates, samples the reference, solves, publishes plans; never commands the aircraft.
+
+ROS Subscribers:
+    dji_sdk/attitude, dji_sdk/imu, dji_sdk/velocity, dji_sdk/local_position: the state.
+    nmpc/status (nmpc_msgs/ControllerStatus): mode of the guard and the input really sent.
+    nmpc/hold_request (std_msgs/Empty): drop the goal and hold position.
+    obstacles (nmpc_msgs/ObstacleArray): joined by id with those of the scenario.
+    command/pose (geometry_msgs/PoseStamped): go to this point.
+ROS Action: fly_trajectory (nmpc_msgs/FlyTrajectory).
+ROS Publishers: see ``publishers``.
+ROS Parameters:
+    ~vehicle (str): file under config/vehicles. ~weights (str): weight preset, default the scenario's own.
+    ~scenario (str): name or path of a scenario that is offered beside the named ones.
+    ~backend (str): compiled or ipopt. ~avoidance (bool): false removes the obstacle term.
+    ~frame_id (str): world frame. ~base_frame (str): body frame.
+"""
+
+import queue
+import sys
+import traceback
+from collections import deque
+from dataclasses import replace
+from typing import Callable, Deque, Dict, Optional, Sequence, Tuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import PointStamped, PoseStamped, QuaternionStamped, Vector3Stamped
+from nmpc_control.controller import Controller
+from nmpc_control.errors import NmpcError
+
+from nmpc_control.params import Parameters, load_parameters, load_weights
+from nmpc_control.ros.conversions import obstacles_from_msg
+from nmpc_control.ros.publishers import Publishers
+from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
+from nmpc_control.rotations import rpy_from_quaternion
+from nmpc_control.scenario import Scenario, load_scenario
+from nmpc_control.state import POSITION, YAW, Goal, Obstacle
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Empty
+
+from nmpc_msgs.msg import ControllerStatus, ObstacleArray
+
+_ENGAGED = (ControllerStatus.MODE_FLYING, ControllerStatus.MODE_HOVERING, ControllerStatus.MODE_BRAKING)
+_FARTHEST_GOAL = 1000.0  # [m] from the origin; a pose beyond it is a mistake
+
+
+class ControllerNode:
+    """Callbacks store or queue; everything else happens in ``run``, in one thread."""
+
+    def __init__(self) -> None:
+        self.frame_id = rospy.get_param("~frame_id", "world")
+        self.parameters = load_node_parameters()
+        self.controller = Controller(self.parameters)
+        self.scenario: Optional[Scenario] = None
+        offered = rospy.get_param("~scenario", "")
+        self._offered = load_scenario(offered) if offered else None
+        self._inputs: Deque[Tuple[float, Tuple[float, ...]]] = deque(maxlen=200)
+        self._requests: "queue.Queue[Callable[[float], None]]" = queue.Queue(maxsize=20)
+        self._heard: Dict[str, Obstacle] = {}
+        self.publishers = Publishers(self.frame_id, rospy.get_param("~base_frame", "base_link"))
+        self.action = TrajectoryAction(
+            on_goal=lambda: self._request(self._accept_goal),
+            on_cancel=lambda: self._request(self._cancel_goal),
+        )
+        if self._offered:
+            self._show(self._offered)
+
+    def run(self) -> None:
+        """Solve at the controller's rate until shutdown; a failed tick is reported and the next one tried."""
+        self.action.start()
+        self._subscribe()
+        rate = rospy.Rate(self.parameters.flight.rate)
+        period = 1.0 / self.parameters.flight.rate
+        misses, last = 0, None
+        while not rospy.is_shutdown():
+            now = rospy.Time.now()
+            if last is not None:
+                misses += max(0, int(round((now - last).to_sec() / period)) - 1)
+            last = now
+            try:
+                self._tick(now, misses)
+            except Exception:  # noqa: BLE001 (one bad tick must not end the control of an aircraft)
+                rospy.logerr_throttle(1.0, f"control step failed: {traceback.format_exc(limit=-3)}")
+                self.controller.nmpc.reset()
+            try:
+                rate.sleep()
+            except rospy.ROSTimeMovedBackwardsException:
+                rospy.logwarn("the clock jumped backwards")
+                self.controller = Controller(self.parameters)
+                last = None
+            except rospy.ROSInterruptException:
+                break
+
+    def _tick(self, now: rospy.Time, misses: int) -> None:
+        t = now.to_sec()
+        while self._inputs:
+            sent, u = self._inputs.popleft()
+            self.controller.record_input(sent, np.array(u))
+        while not self._requests.empty():
+            self._requests.get_nowait()(t)
+        pursued = self.controller.itinerary.goal is not Goal.HOLD
+        clock_start = self.controller.itinerary.clock_start
+        step = self.controller.step(t)
+        self.publishers.diagnose(step, misses)
+        if step is None:
+            return
+        self.publishers.step(now, step, misses)
+        itinerary = self.controller.itinerary
+        if itinerary.clock_start is not None and itinerary.clock_start != clock_start:
+            self.publishers.trajectory(self.scenario, itinerary.clock_start)
+        self.action.report(t, step, itinerary, pursued)
+
+    def _accept_goal(self, t: float) -> None:
+        goal = self.action.accept()
+        if goal is None:
+            return
+        try:
+            scenario = scenario_of(goal, self._offered)
+        except NmpcError as error:
+            self.action.finish(t, False, str(error))
+            return
+        estimate = self.controller.estimator.estimate(t)
+        if estimate is None or not self.controller.engaged:
+            self.action.finish(t, False, "automatic flight is off: call `start` first")
+            return
+        self._use(scenario)
+        x = estimate.vector
+        self.controller.itinerary.fly(t, x[POSITION], x[YAW], scenario.trajectory)
+
+    def _use(self, scenario: Scenario) -> None:
+        weights = rospy.get_param("~weights", "") or scenario.weights
+        self.parameters = replace(self.parameters, weights=load_weights(weights))
+        self.controller.use(self.parameters)
+        self._show(scenario)
+
+    def _show(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self._join_obstacles()
+        self.publishers.trajectory(scenario, None)
+        self.publishers.room(scenario.room)
+
+    def _cancel_goal(self, t: float) -> None:
+        if self.action.cancelled:
+            self._hold(t, "the goal was cancelled")
+
+    def _hold(self, t: float, message: str) -> None:
+        estimate = self.controller.estimator.estimate(t)
+        if estimate is not None:
+            self.controller.itinerary.hold(estimate.vector[POSITION], estimate.vector[YAW], message)
+        self.action.finish(t, False, message)
+
+    def _go_to(self, t: float, pose: PoseStamped) -> None:
+        q, p = pose.pose.orientation, pose.pose.position
+        target = np.array([p.x, p.y, p.z])
+        estimate = self.controller.estimator.estimate(t)
+        if pose.header.frame_id not in ("", self.frame_id):
+            rospy.logwarn(f"command/pose refused: frame {pose.header.frame_id!r}, expected {self.frame_id!r}")
+        elif not np.all(np.isfinite(target)) or np.linalg.norm(target) > _FARTHEST_GOAL:
+            rospy.logwarn("command/pose refused: position is not finite or too far away")
+        elif estimate is None or not self.controller.engaged:
+            rospy.logwarn("command/pose refused: automatic flight is off, call `start` first")
+        else:
+            x = estimate.vector
+            given = abs(q.x**2 + q.y**2 + q.z**2 + q.w**2 - 1.0) < 0.05
+            yaw = rpy_from_quaternion((q.x, q.y, q.z, q.w))[2] if given else float(x[YAW])
+            self.action.finish(t, False, "replaced by command/pose")
+            self.controller.itinerary.go_to(t, x[POSITION], x[YAW], target, yaw)
+
+    def _request(self, action: Callable[[float], None]) -> None:
+        try:
+            self._requests.put_nowait(action)
+        except queue.Full:
+            rospy.logwarn_throttle(1.0, "more requests than can be served: one dropped")
+
+    def _join_obstacles(self) -> None:
+        joined = {obstacle.id: obstacle for obstacle in (self.scenario.obstacles if self.scenario else ())}
+        joined.update(self._heard)
+        self.controller.obstacles = tuple(joined.values())
+        self.publishers.obstacles(self.controller.obstacles)
+
+    def _take_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
+        self._heard = {obstacle.id: obstacle for obstacle in obstacles}
+        self._join_obstacles()
+
+    def _subscribe(self) -> None:
+        def listen(topic: str, kind: type, callback: Callable, queue_size: int = 1) -> None:
+            rospy.Subscriber(topic, kind, callback, queue_size=queue_size, tcp_nodelay=True)
+
+        def on_attitude(m: QuaternionStamped) -> None:
+            q = m.quaternion
+            self.controller.estimator.add_attitude(m.header.stamp.to_sec(), (q.x, q.y, q.z, q.w))
+
+        def on_imu(m: Imu) -> None:
+            w = m.angular_velocity
+            self.controller.estimator.add_imu(m.header.stamp.to_sec(), (w.x, w.y, w.z))
+
+        def on_velocity(m: Vector3Stamped) -> None:
+            self.controller.estimator.add_velocity(m.header.stamp.to_sec(), (m.vector.x, m.vector.y, m.vector.z))
+
+        def on_position(m: PointStamped) -> None:
+            self.controller.estimator.add_position(m.header.stamp.to_sec(), (m.point.x, m.point.y, m.point.z))
+
+        def on_status(m: ControllerStatus) -> None:
+            self.controller.engaged = m.mode in _ENGAGED
+            if m.setpoint_sent:
+                u = (m.applied.thrust, m.applied.roll, m.applied.pitch, m.applied.yaw_rate)
+                self._inputs.append((m.header.stamp.to_sec(), u))
+
+        def on_obstacles(m: ObstacleArray) -> None:
+            obstacles = obstacles_from_msg(m)
+            self._request(lambda t: self._take_obstacles(obstacles))
+
+        listen("dji_sdk/attitude", QuaternionStamped, on_attitude)
+        listen("dji_sdk/imu", Imu, on_imu)
+        listen("dji_sdk/velocity", Vector3Stamped, on_velocity)
+        listen("dji_sdk/local_position", PointStamped, on_position)
+        listen("nmpc/status", ControllerStatus, on_status, queue_size=10)
+        listen("nmpc/hold_request", Empty, lambda m: self._request(lambda t: self._hold(t, "told to hold")))
+        listen("obstacles", ObstacleArray, on_obstacles)
+        listen("command/pose", PoseStamped, lambda m: self._request(lambda t: self._go_to(t, m)))
+
+
+def load_node_parameters() -> Parameters:
+    """Return the parameters that the private ROS parameters select; raises ConfigError."""
+    parameters = load_parameters(rospy.get_param("~vehicle", "dji_hil"), rospy.get_param("~weights", "") or "outdoor")
+    solver = replace(parameters.solver, backend=rospy.get_param("~backend", parameters.solver.backend))
+    avoidance = replace(parameters.avoidance, enabled=rospy.get_param("~avoidance", parameters.avoidance.enabled))
+    return replace(parameters, solver=solver, avoidance=avoidance)
+
+
+def main() -> None:
+    """Entry point of the node."""
+    rospy.init_node("nmpc_controller")
+    try:
+        node = ControllerNode()
+    except NmpcError as error:
+        rospy.logfatal(str(error))
+        sys.exit(2)
+    node.run()

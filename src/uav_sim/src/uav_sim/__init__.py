@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""A simulated Matrice 100 behind the interface of dji_sdk."""

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT
+"""Log of a simulated flight as the record that the offline metrics read."""
+
+from typing import Dict, List
+
+import numpy as np
+from nmpc_control import dji
+from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Reference, Series
+from nmpc_control.scenario import Scenario
+from nmpc_control.state import POSITION, VELOCITY, Obstacle
+
+from uav_sim.closed_loop.loop import Log
+from uav_sim.world import World
+
+_REFERENCE_SAMPLES = 4000
+
+
+def record_of(scenario: Scenario, log: Log, collisions: int) -> FlightRecord:
+    """Return the record of a flight; its clock is the simulation's."""
+    steps, outputs = log.steps, log.outputs
+    solved = np.array([step.estimate.t for step in steps])
+    thrust = [(t, output.axes) for t, output in outputs if output.axes and output.axes[4] == dji.ATTITUDE_THRUST]
+    duration = scenario.trajectory.duration
+    times = np.linspace(0.0, duration, _REFERENCE_SAMPLES)
+    truth_times = np.array([truth.t for truth in log.truths])
+    return FlightRecord(
+        scenario=scenario.name,
+        source="simulation",
+        position=Series(solved, [step.estimate.vector[POSITION] for step in steps]),
+        velocity=Series(solved, [step.estimate.vector[VELOCITY] for step in steps]),
+        attitude=Series(solved, [step.estimate.vector[3:6] for step in steps]),
+        true_position=Series(truth_times, [truth.position for truth in log.truths]),
+        reference=Reference(log.clock_start, Series(times, scenario.trajectory.sample(times).position)),
+        tracked_reference=Series(solved, [step.reference[POSITION] for step in steps]),
+        obstacles=tuple(ObstacleTrack(obstacle) for obstacle in scenario.obstacles),
+        commands=Series([t for t, _ in thrust], [(axes[2], axes[0], axes[1], axes[3]) for _, axes in thrust]),
+        solver=Series(solved, [(s.plan.iterations, s.plan.solve_time, s.plan.found) for s in steps]),
+        status=Series([t for t, _ in outputs], [(output.mode, 0, 0) for _, output in outputs]),
+        automatic=(outputs[0][0], log.end),
+        phase_end=log.end,
+        reported_collisions=collisions,
+    )
+
+
+def world_of(scenario: Scenario, radius: float) -> World:
+    """Return the simulator's own world with the scenario's obstacles around a hull of a radius [m]."""
+    return World.from_list([_entry(obstacle) for obstacle in scenario.obstacles], radius, scenario.name)
+
+
+def _entry(obstacle: Obstacle) -> Dict[str, object]:
+    size: List[float] = [float(v) for v in obstacle.size]
+    entry = {
+        "id": obstacle.id,
+        "shape": obstacle.shape,
+        "position": [float(v) for v in obstacle.position],
+        "velocity": [float(v) for v in obstacle.velocity],
+    }
+    if obstacle.shape == "box":
+        return {**entry, "size": size}
+    if obstacle.shape == "cylinder":
+        return {**entry, "radius": size[0], "height": size[1]}
+    return {**entry, "radius": size[0]}

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""Controller, guard and simulated aircraft on one simulated clock, without ROS and faster than real time."""
+
+from dataclasses import dataclass, field
+from typing import Any, Callable, Dict, List, Optional, Tuple
+
+import numpy as np
+from nmpc_control.controller import Controller, Step
+from nmpc_control.guard import Action, Guard, GuardOutput
+from nmpc_control.guard_inbox import GuardInbox
+from nmpc_control.guard_params import GuardParameters
+from nmpc_control.mode_inputs import STREAMING, Request
+from nmpc_control.params import Parameters
+from nmpc_control.scenario import Scenario
+
+from uav_sim.m100 import SimulatedM100, Truth
+from uav_sim.preset import PlantPreset
+from uav_sim.world import World
+
+_START_TIMEOUT = 30.0  # [s] from the first packet to automatic flight
+_AFTER_ARRIVAL = 1.0  # [s] of hover that is still recorded
+_GENERIC = "generic"
+
+
+@dataclass
+class Log:
+    """What happened, sample by sample."""
+
+    steps: List[Step] = field(default_factory=list)
+    outputs: List[Tuple[float, GuardOutput]] = field(default_factory=list)
+    truths: List[Truth] = field(default_factory=list)
+    clock_start: Optional[float] = None  # [s] of the trajectory's clock
+    end: float = 0.0  # [s]
+
+
+class ClosedLoop:
+    """One vehicle under automatic control; ``step`` advances all of it by one step of the plant."""
+
+    def __init__(
+        self, preset: PlantPreset, world: World, parameters: Parameters, guard_parameters: GuardParameters
+    ) -> None:
+        self.aircraft = SimulatedM100(preset, world)
+        self.controller = Controller(parameters)
+        self.guard = Guard(guard_parameters, parameters.vehicle, parameters.limits)
+        self.inbox = GuardInbox(guard_parameters)
+        self.log = Log()
+        self._ticks = _every(1.0 / guard_parameters.rate, preset.step)
+        self._solves = _every(1.0 / parameters.flight.rate, preset.step)
+        self._count = 0
+
+    @property
+    def t(self) -> float:
+        """Simulated time [s]."""
+        return self.aircraft.t
+
+    def step(self) -> None:
+        """Advance by one step: telemetry, solve when due, guard when due, aircraft."""
+        for packet in self.aircraft.step():
+            self._receive(packet.topic, packet.t, packet.value)
+        self._count += 1
+        if self._count % self._solves == 0:
+            self._solve()
+        if self._count % self._ticks == 0:
+            self._tick()
+            self.log.truths.append(self.aircraft.truth)
+
+    def _receive(self, topic: str, t: float, value: Any) -> None:
+        for estimator in (self.controller.estimator, self.inbox.estimator):
+            if topic == "attitude":
+                estimator.add_attitude(t, value)
+            elif topic == "imu":
+                estimator.add_imu(t, value.angular_velocity)
+            elif topic == "velocity":
+                estimator.add_velocity(t, value)
+            elif topic == "local_position":
+                estimator.add_position(t, value)
+        timed: Dict[str, Callable[[float, Any], None]] = {
+            "rc": self.inbox.add_rc,
+            "flight_status": self.inbox.add_flight_status,
+            "gps_health": self.inbox.add_gps_health,
+            "battery_state": self.inbox.add_battery,
+        }
+        if topic in timed:
+            timed[topic](t, value)
+        elif topic == "height_above_takeoff":
+            self.inbox.add_height(value)
+
+    def _solve(self) -> None:
+        step = self.controller.step(self.t)
+        if step is None:
+            return
+        self.inbox.add_plan(step.plan, step.goal)
+        if self.controller.itinerary.clock_start is not None:
+            self.log.clock_start = self.controller.itinerary.clock_start
+        self.log.steps.append(step)
+
+    def _tick(self) -> None:
+        output = self.guard.tick(self.inbox.inputs(self.t))
+        for action in output.actions:
+            self._act(action)
+        if output.axes is not None:
+            self.aircraft.setpoint(_GENERIC, output.axes)
+        if output.applied is not None:
+            self.controller.record_input(self.t, np.array(output.applied))
+        self.controller.engaged = output.mode in STREAMING
+        self.log.outputs.append((self.t, output))
+
+    def _act(self, action: Action) -> None:
+        if action is Action.OBTAIN_AUTHORITY:
+            self.inbox.authority = self.aircraft.control_authority(True).result
+        elif action is Action.RELEASE_AUTHORITY:
+            self.aircraft.control_authority(False)
+            self.inbox.authority = False
+        elif action is Action.TAKE_OFF:
+            self.aircraft.task(4)
+        elif action is Action.LAND:
+            self.aircraft.task(6)
+        elif action is Action.SET_REFERENCE:
+            self.aircraft.set_local_position_reference()
+        elif action is Action.HOLD:
+            x = self.controller.estimator.estimate(self.t).vector
+            self.controller.itinerary.hold(x[:3], x[5])
+
+
+def fly(
+    scenario: Scenario,
+    loop: ClosedLoop,
+    approach: bool = False,
+    on_progress: Callable[[float], None] = lambda progress: None,
+) -> Log:
+    """Fly a scenario from its initial position in the air; returns the log of the whole flight.
+
+    Args:
+        scenario: what to fly; its obstacles are known to controller and guard.
+        loop: aircraft and control, new.
+        approach: fly to the start and settle first; otherwise the clock starts as soon as automatic flight is on.
+        on_progress: called with 0..1.
+    """
+    loop.aircraft.place(scenario.initial_position, yaw=scenario.start_yaw)
+    loop.controller.obstacles = loop.inbox.obstacles = scenario.obstacles
+    while loop.guard.mode not in STREAMING or not loop.controller.engaged or loop.guard.mode.name == "BRAKING":
+        loop.inbox.request = Request.START
+        loop.step()
+        if loop.t > _START_TIMEOUT:
+            raise RuntimeError(f"automatic flight did not begin: {loop.log.outputs[-1][1].reason}")
+    itinerary = loop.controller.itinerary
+    x = loop.controller.estimator.estimate(loop.t).vector
+    if approach:
+        itinerary.fly(loop.t, x[:3], x[5], scenario.trajectory)
+    else:
+        itinerary.begin(loop.t, scenario.trajectory)
+    while itinerary.outcome is None and loop.guard.mode in STREAMING:
+        loop.step()
+        on_progress(itinerary.progress(loop.t))
+    end = loop.t + _AFTER_ARRIVAL
+    while loop.t < end:
+        loop.step()
+    loop.log.end = loop.t
+    return loop.log
+
+
+def _every(period: float, step: float) -> int:
+    return max(1, round(period / step))

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""Fly one scenario without ROS, faster than real time: controller, guard and simulated aircraft in one process.
+
+With ``--plant paper`` a scenario that has a variant ``paper`` is flown as in the paper's table of simulations (geometry,
+duration, start at rest, the paper's meaning of distance: from the aircraft's centre, no hull).
+"""
+
+import argparse
+import dataclasses
+import json
+import sys
+from pathlib import Path
+from typing import List, Optional, Tuple
+
+from nmpc_control.analysis.metrics import flight_metrics
+from nmpc_control.analysis.record import Metrics
+from nmpc_control.analysis.tables import as_text
+from nmpc_control.config import load_yaml
+from nmpc_control.errors import NmpcError
+from nmpc_control.guard_params import load_guard_parameters
+from nmpc_control.params import Parameters, load_parameters
+from nmpc_control.scenario import Scenario, load_scenario, scenario_path
+from rich.progress import Progress
+
+from uav_sim.closed_loop.flight_record import record_of, world_of
+from uav_sim.closed_loop.loop import ClosedLoop, fly
+from uav_sim.errors import SimulatorError
+from uav_sim.preset import load_preset, preset_names
+
+_PAPER = "paper"
+
+
+def main(argv: Optional[List[str]] = None) -> None:
+    """Entry point of ``simulate``; exit status 0 only if the flight arrived and hit nothing."""
+    options = _parser().parse_args(argv)
+    try:
+        scenario, parameters = _prepare(options)
+        metrics = simulate(scenario, parameters, options.plant, quiet=options.quiet)
+        if options.json:
+            options.json.write_text(json.dumps(metrics, indent=2) + "\n", encoding="utf-8")
+    except (NmpcError, SimulatorError) as error:
+        _fail(str(error))
+    except OSError as error:
+        _fail(f"{error.filename}: {error.strerror}")
+    if not options.quiet:
+        sys.stdout.write(as_text([metrics]) + "\n")
+    sys.exit(0 if metrics["arrived"] and metrics["collisions"] == 0 else 1)
+
+
+def simulate(scenario: Scenario, parameters: Parameters, plant: str, quiet: bool = True) -> Metrics:
+    """Return the metrics of one simulated flight.
+
+    Args:
+        scenario: what to fly.
+        parameters: of the controller; the vehicle's radius is the hull for avoidance, checks and metrics.
+        plant: name of the plant preset.
+        quiet: no progress bar.
+
+    Raises:
+        ConfigError: a preset that does not exist.
+    """
+    radius = parameters.vehicle.radius
+    world = world_of(scenario, radius)
+    loop = ClosedLoop(load_preset(plant), world, parameters, load_guard_parameters())
+    with Progress(disable=quiet, transient=True) as bar:
+        task = bar.add_task(f"{scenario.name} on {plant}", total=1.0)
+        log = fly(scenario, loop, on_progress=lambda progress: bar.update(task, completed=progress))
+    metrics = flight_metrics(record_of(scenario, log, len(loop.aircraft.collisions)), radius)
+    metrics["plant"] = plant
+    metrics["clearance_truth_m"] = dict(loop.aircraft.clearance)
+    metrics["plans_rejected"] = loop.guard.ladder.rejected
+    return metrics
+
+
+def _prepare(options: argparse.Namespace) -> Tuple[Scenario, Parameters]:
+    variant = options.variant
+    if variant is None and options.plant == _PAPER:
+        variant = _PAPER if _PAPER in (load_yaml(scenario_path(options.scenario)).get("variants") or {}) else None
+    scenario = load_scenario(options.scenario, variant=variant)
+    load_preset(options.plant)
+    parameters = load_parameters(options.vehicle or options.plant, options.weights or scenario.weights)
+    radius = options.vehicle_radius
+    if radius is None:
+        radius = 0.0 if variant == _PAPER and options.plant == _PAPER else parameters.vehicle.radius
+    return scenario, dataclasses.replace(
+        parameters,
+        vehicle=dataclasses.replace(parameters.vehicle, radius=radius),
+        solver=dataclasses.replace(parameters.solver, backend=options.backend or parameters.solver.backend),
+        avoidance=dataclasses.replace(parameters.avoidance, enabled=options.avoidance == "on"),
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="simulate", description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("scenario", help="name of a scenario, or path of a YAML file")
+    parser.add_argument("--plant", default="dji_hil", choices=preset_names(), help="simulated aircraft (default: %(default)s)")
+    parser.add_argument("--vehicle", help="the controller's model of it (default: as the plant)")
+    parser.add_argument("--variant", help="variant of the scenario")
+    parser.add_argument("--weights", help="weight preset (default: the scenario's)")
+    parser.add_argument("--backend", choices=["compiled", "ipopt"], help="solver")
+    parser.add_argument("--avoidance", default="on", choices=["on", "off"], help="off: fly into obstacles")
+    parser.add_argument("--vehicle-radius", type=_radius, help="hull [m] (default: the vehicle's 0.5)")
+    parser.add_argument("--json", type=Path, help="write the metrics to this file")
+    parser.add_argument("--quiet", action="store_true", help="no progress, no table")
+    return parser
+
+
+def _radius(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value <= 5.0:
+        raise argparse.ArgumentTypeError(f"got {text}, expected metres in [0, 5]")
+    return value
+
+
+def _fail(text: str) -> None:
+    sys.stderr.write(f"simulate: {text}\n")
+    sys.exit(2)

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""From setpoints and sticks to attitude, thrust and yaw rate commands of the plant."""
+
+import math
+from typing import Tuple
+
+from uav_sim.flight_loops import FlightLoops
+from uav_sim.plant import Plant
+from uav_sim.remote_control import RemoteControl
+from uav_sim.setpoint import Frame, Horizontal, Setpoint, Vertical, Yaw
+
+Command = Tuple[float, float, float, float]  # roll, pitch [rad], thrust [percent], yaw rate [rad/s]
+
+
+class Guidance:
+    """Follows one setpoint at a time, or the pilot's sticks; positions are world ENU."""
+
+    def __init__(self, plant: Plant, loops: FlightLoops) -> None:
+        self._plant = plant
+        self._loops = loops
+        self._limits = plant.preset.flight_controller.limits
+
+    def accept(self, setpoint: Setpoint) -> None:
+        """Make a setpoint the one to follow; a position is an offset from where we are now."""
+        self._setpoint = setpoint
+        is_angle = setpoint.horizontal is Horizontal.ANGLE
+        x, y, plant = setpoint.x, setpoint.y, self._plant
+        if is_angle:
+            x, y = -math.radians(y), math.radians(x)  # tilt ahead or north, tilt right or east
+        # In the GROUND frame an angle, too, is relative to north and east (dji_sdk.md 3.3).
+        east, north = (y, x) if setpoint.frame is Frame.GROUND else self._east_north(x, y)
+        if is_angle and setpoint.frame is Frame.BODY:
+            self._target = (y, x)
+        elif setpoint.horizontal is Horizontal.POSITION:
+            self._target = (plant.position[0] + east, plant.position[1] + north)
+        else:
+            self._target = (east, north)
+        stops = setpoint.horizontal is Horizontal.VELOCITY and setpoint.x == setpoint.y == 0.0
+        self._holds = stops and setpoint.stable
+        if not self._holds:
+            self._loops.release_position()
+        self._loops.release_height()
+
+    def follow(self, takeoff_height: float) -> Command:
+        """Return the command for the setpoint; heights count from ``takeoff_height`` [m]."""
+        setpoint, loops = self._setpoint, self._loops
+        if setpoint.vertical is Vertical.THRUST:
+            percent = setpoint.z
+        elif setpoint.vertical is Vertical.VELOCITY:
+            percent = loops.climb(setpoint.z)
+        else:
+            percent = loops.height(takeoff_height + setpoint.z, self._limits.vertical_velocity)
+        if setpoint.yaw_mode is Yaw.RATE:
+            yaw_rate = -math.radians(setpoint.yaw)
+        else:
+            yaw_rate = loops.turn_to(math.radians(90.0 - setpoint.yaw))
+        roll, pitch = self._tilt(setpoint)
+        return roll, pitch, percent, yaw_rate
+
+    def follow_sticks(self, rc: RemoteControl, has_position: bool) -> Command:
+        """Return the command for the sticks: velocity, hold when centred; in A they are tilt."""
+        loops, limits = self._loops, self._limits
+        roll_stick, pitch_stick, yaw_stick, throttle = rc.sticks()
+        if rc.mode == "A" or not has_position:
+            loops.release_position()
+            tilt_limit = self._plant.preset.tilt_limit
+            roll, pitch = roll_stick * tilt_limit, pitch_stick * tilt_limit
+        elif roll_stick or pitch_stick:
+            loops.release_position()
+            speed = limits.horizontal_velocity
+            roll, pitch = loops.velocity(*self._east_north(pitch_stick * speed, roll_stick * speed))
+        else:
+            roll, pitch = loops.hold()
+        if throttle:
+            loops.release_height()
+            percent = loops.climb(throttle * limits.vertical_velocity)
+        else:
+            percent = loops.hold_height()
+        return roll, pitch, percent, -yaw_stick * limits.yaw_rate
+
+    def _tilt(self, setpoint: Setpoint) -> Tuple[float, float]:
+        loops = self._loops
+        if setpoint.horizontal is Horizontal.ANGLE:
+            if setpoint.frame is Frame.BODY:
+                return self._target
+            east, north = self._target
+            cos_yaw, sin_yaw = math.cos(self._plant.yaw), math.sin(self._plant.yaw)
+            return sin_yaw * east - cos_yaw * north, cos_yaw * east + sin_yaw * north
+        if self._holds:
+            return loops.hold()
+        if setpoint.horizontal is Horizontal.VELOCITY:
+            return loops.velocity(*self._target, resist_wind=setpoint.stable)
+        return loops.position(*self._target, speed=self._limits.horizontal_velocity)
+
+    def _east_north(self, ahead: float, right: float) -> Tuple[float, float]:
+        """Turn a vector from heading axes into the world."""
+        cos_yaw, sin_yaw = math.cos(self._plant.yaw), math.sin(self._plant.yaw)
+        return cos_yaw * ahead + sin_yaw * right, sin_yaw * ahead - cos_yaw * right

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: MIT
+"""A simulated M100 as seen through dji_sdk, without ROS: setpoints and requests in, packets out."""
+
+import math
+from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+
+from uav_sim.autopilot import Ack, Autopilot, Phase, Receipt
+from uav_sim.errors import SetpointError
+from uav_sim.plant import Plant, Vector
+from uav_sim.preset import PACKET_PERIOD, PlantPreset
+from uav_sim.remote_control import RemoteControl
+from uav_sim.setpoint import decode
+from uav_sim.telemetry import Packet, Telemetry, body_rates
+from uav_sim.world import Collision, World
+
+
+class Truth(NamedTuple):
+    """True state, without delay; world ENU, body FLU."""
+
+    t: float  # [s]
+    position: Vector  # [m]
+    velocity: Vector  # [m/s]
+    rpy: Vector  # [rad] roll, pitch, yaw in (-pi, pi]
+    rates: Vector  # [rad/s] angular velocity in body axes
+
+
+class SimulatedM100:
+    """Plant, flight controller, link and surroundings on one clock; deterministic.
+
+    Begins on the ground at the world's origin with motors off and the RC in F. ``rc`` as well as
+    ``wind``, ``thrust_gain`` and ``mass_factor`` of ``plant`` may be changed at any time.
+    """
+
+    def __init__(self, preset: PlantPreset, world: Optional[World] = None) -> None:
+        self.preset = preset
+        self.t = 0.0  # [s]
+        self.battery = 100.0  # [percent]
+        self.rc = RemoteControl()
+        self.plant = Plant(preset)
+        self.autopilot = Autopilot(self.plant, self.rc)
+        self.world = world or World((), preset.radius)
+        self.new_collisions: List[Collision] = []  # of the last step
+        self._telemetry = Telemetry(self.plant)
+        self._steps = 0
+        self._steps_per_packet = round(PACKET_PERIOD / preset.step)
+        self._discharge = 100.0 * preset.step / preset.flight_time
+
+    def place(
+        self,
+        position: Sequence[float],
+        velocity: Sequence[float] = (0.0, 0.0, 0.0),
+        yaw: float = 0.0,
+        airborne: bool = True,
+        authority: bool = False,
+    ) -> None:
+        """Begin a flight at a position (3,) [m], hovering with motors on or standing on the ground.
+
+        In the air, the world's origin is the local position's reference already. Collisions and
+        clearances are counted anew.
+        """
+        self.plant.place(position, velocity, yaw, airborne)
+        self.autopilot.start(self.t, airborne, authority)
+        self.world.reset()
+        self.world.observe(self.t, self.plant.position)
+        if airborne:
+            self._telemetry.refer_to_home(self.t)
+
+    def step(self) -> List[Packet]:
+        """Advance by ``preset.step``; return the packets received in it, oldest first."""
+        plant = self.plant
+        self.autopilot.update(self.t)
+        plant.step()
+        self._steps += 1
+        self.t = self._steps * self.preset.step
+        if plant.motors_on:
+            self.battery = max(0.0, self.battery - self._discharge)
+        self.new_collisions = self.world.observe(self.t, plant.position)
+        if self._steps % self._steps_per_packet == 0:
+            self._telemetry.sample(
+                self.t,
+                rc=self.rc.axes(self.preset.flight_controller.rc),
+                gps_health=self.autopilot.gps_health,
+                height=self.autopilot.height,
+                flight_status=self.autopilot.flight_status,
+                battery=float(math.ceil(self.battery)),
+            )
+        return self._telemetry.due(self.t)
+
+    def run(self, duration: float) -> List[Packet]:
+        """Advance by a duration [s]; return all packets received."""
+        return [packet for _ in range(round(duration / self.preset.step)) for packet in self.step()]
+
+    def setpoint(self, suffix: str, axes: Sequence[float]) -> Receipt:
+        """Send axes on the topic ``flight_control_setpoint_<suffix>``; say what became of them."""
+        try:
+            setpoint = decode(suffix, axes)
+        except SetpointError as error:
+            return Receipt(False, str(error))
+        return self.autopilot.setpoint(self.t, setpoint)
+
+    def control_authority(self, enable: bool) -> Ack:
+        """Obtain or release the control authority."""
+        return self.autopilot.control_authority(enable)
+
+    def arm(self, start: bool) -> Ack:
+        """Start or stop the motors on the ground."""
+        return self.autopilot.arm(self.t, start)
+
+    def task(self, number: int) -> Ack:
+        """Start a task: 1 go home, 4 take off, 6 land."""
+        return self.autopilot.task(self.t, number)
+
+    def set_local_position_reference(self) -> bool:
+        """Make the newest GPS position the origin of ``local_position``."""
+        return self._telemetry.set_local_position_reference(self.t)
+
+    @property
+    def phase(self) -> Phase:
+        """What the flight controller is doing."""
+        return self.autopilot.phase
+
+    @property
+    def truth(self) -> Truth:
+        """True state at ``t``."""
+        plant = self.plant
+        roll, pitch, yaw = plant.rpy
+        rpy = (roll, pitch, math.remainder(yaw, 2.0 * math.pi))
+        return Truth(self.t, plant.position, plant.velocity, rpy, body_rates(rpy, plant.rpy_rates))
+
+    @property
+    def collisions(self) -> Tuple[Collision, ...]:
+        """All collisions since the flight began."""
+        return tuple(self.world.collisions)
+
+    @property
+    def clearance(self) -> Dict[str, float]:
+        """Least distance [m] from hull to each obstacle's surface since the flight began, by id."""
+        return self.world.clearance

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: MIT
+"""The aircraft below its flight controller: attitude, translation, drag, wind and the ground.
+
+World ENU, body FLU, roll-pitch-yaw about x, y, z; positive pitch is nose down. The ground is z = 0.
+"""
+
+import math
+from typing import Sequence, Tuple
+
+from uav_sim.preset import PlantPreset
+from uav_sim.response import DeadTime, make_response
+
+Vector = Tuple[float, float, float]
+
+
+def limit_norm(x: float, y: float, limit: float) -> Tuple[float, float]:
+    """Return the vector (x, y) shortened to a norm."""
+    norm = math.hypot(x, y)
+    if norm <= limit:
+        return x, y
+    return x * limit / norm, y * limit / norm
+
+
+class Plant:
+    """Rigid body that follows attitude, thrust and yaw rate commands as identified.
+
+    Advances in fixed steps: attitude responses exactly, translation by the midpoint rule.
+    ``thrust_gain`` multiplies the force, ``mass_factor`` the mass; ``wind`` is the air's velocity.
+    """
+
+    def __init__(self, preset: PlantPreset) -> None:
+        self.preset = preset
+        self.wind: Vector = (0.0, 0.0, 0.0)
+        self.thrust_gain = 1.0
+        self.mass_factor = 1.0
+        step, delay = preset.step, preset.delay
+        self._roll_line = DeadTime(delay.attitude, step)
+        self._pitch_line = DeadTime(delay.attitude, step)
+        self._thrust_line = DeadTime(delay.thrust, step)
+        self._yaw_rate_line = DeadTime(delay.yaw_rate, step)
+        self._heading_drag = preset.drag.frame == "heading"
+        self.place((0.0, 0.0, 0.0), airborne=False)
+
+    def place(
+        self,
+        position: Sequence[float],
+        velocity: Sequence[float] = (0.0, 0.0, 0.0),
+        yaw: float = 0.0,
+        airborne: bool = True,
+    ) -> None:
+        """Put the vehicle level at a position (3,) [m], hovering with motors on or standing."""
+        preset = self.preset
+        self.position: Vector = tuple(float(v) for v in position)
+        self.velocity: Vector = tuple(float(v) for v in velocity)
+        self.acceleration: Vector = (0.0, 0.0, 0.0)
+        self.yaw = yaw
+        self._roll = make_response(preset.roll, preset.step)
+        self._pitch = make_response(preset.pitch, preset.step)
+        self._yaw_rate = make_response(preset.yaw_rate, preset.step)
+        self.motors_on = airborne
+        self.on_ground = not airborne
+        self.impact_speed = 0.0  # [m/s] of the last touch-down
+        hover = self.hover_percent if airborne else 0.0
+        self.command(0.0, 0.0, hover, 0.0)
+        for line in (self._roll_line, self._pitch_line, self._yaw_rate_line):
+            line.fill(0.0)
+        self._thrust_line.fill(preset.thrust.acceleration(hover))
+
+    @property
+    def hover_percent(self) -> float:
+        """Thrust percentage that carries this aircraft as it is."""
+        preset = self.preset
+        return preset.thrust.percent(preset.gravity * self.mass_factor / self.thrust_gain)
+
+    @property
+    def rpy(self) -> Vector:
+        """Roll, pitch, yaw [rad]; yaw is not wrapped."""
+        return self._roll.value, self._pitch.value, self.yaw
+
+    @property
+    def rpy_rates(self) -> Vector:
+        """Time derivatives of roll, pitch, yaw [rad/s]."""
+        return self._roll.rate, self._pitch.rate, self._yaw_rate.value
+
+    def command(self, roll: float, pitch: float, percent: float, yaw_rate: float) -> None:
+        """Hold from now on roll, pitch [rad], thrust [percent] (0: idle) and yaw rate [rad/s]."""
+        self._roll_ref, self._pitch_ref = limit_norm(roll, pitch, self.preset.tilt_limit)
+        self._thrust_ref = self.preset.thrust.acceleration(percent)
+        self._yaw_rate_ref = yaw_rate
+
+    def step(self) -> None:
+        """Advance by ``preset.step``."""
+        thrust = self._thrust_line.push(self._thrust_ref) * self.thrust_gain / self.mass_factor
+        force, cos_yaw, sin_yaw = self._turn(thrust if self.motors_on else 0.0)
+        if self.position[2] <= 0.0 and force[2] <= self.preset.gravity and self.velocity[2] <= 0.0:
+            self._slide(force)
+        else:
+            self._fly(force, cos_yaw, sin_yaw)
+
+    def _turn(self, thrust: float) -> Tuple[Vector, float, float]:
+        """Advance the attitude; return mean thrust acceleration, cosine and sine of mean yaw."""
+        roll, pitch, yaw_rate = self._roll, self._pitch, self._yaw_rate
+        # Legs on the ground keep the aircraft level and its heading fixed.
+        free = 0.0 if self.on_ground else 1.0
+        roll_before, pitch_before, yaw_before = roll.value, pitch.value, self.yaw
+        rate_before = yaw_rate.value
+        roll.advance(free * self._roll_line.push(self._roll_ref))
+        pitch.advance(free * self._pitch_line.push(self._pitch_ref))
+        yaw_rate.advance(free * self._yaw_rate_line.push(self._yaw_rate_ref))
+        self.yaw = yaw_before + 0.5 * self.preset.step * (rate_before + yaw_rate.value)
+        phi, theta = 0.5 * (roll_before + roll.value), 0.5 * (pitch_before + pitch.value)
+        psi = 0.5 * (yaw_before + self.yaw)
+        cos_roll, sin_roll = math.cos(phi), math.sin(phi)
+        cos_yaw, sin_yaw = math.cos(psi), math.sin(psi)
+        forward, up = cos_roll * math.sin(theta), cos_roll * math.cos(theta)
+        force = (
+            thrust * (forward * cos_yaw + sin_roll * sin_yaw),
+            thrust * (forward * sin_yaw - sin_roll * cos_yaw),
+            thrust * up,
+        )
+        return force, cos_yaw, sin_yaw
+
+    def _fly(self, force: Vector, cos_yaw: float, sin_yaw: float) -> None:
+        h = self.preset.step
+        vx, vy, vz = self.velocity
+        ax, ay, az = self._accelerate(force, vx, vy, vz, cos_yaw, sin_yaw)
+        mx, my, mz = vx + 0.5 * h * ax, vy + 0.5 * h * ay, vz + 0.5 * h * az
+        ax, ay, az = self._accelerate(force, mx, my, mz, cos_yaw, sin_yaw)
+        x, y, z = self.position
+        z += h * mz
+        vz_next = vz + h * az
+        self.on_ground = z <= 0.0 and vz_next <= 0.0
+        if self.on_ground:
+            self.impact_speed = -vz_next
+            z, vz_next = 0.0, 0.0
+        self.position = (x + h * mx, y + h * my, z)
+        self.velocity = (vx + h * ax, vy + h * ay, vz_next)
+        self.acceleration = (ax, ay, (vz_next - vz) / h)
+
+    def _accelerate(
+        self, force: Vector, vx: float, vy: float, vz: float, cos_yaw: float, sin_yaw: float
+    ) -> Vector:
+        """Return the acceleration (3,) of thrust, drag and gravity in free air."""
+        drag, wind = self.preset.drag, self.wind
+        vx, vy, vz = vx - wind[0], vy - wind[1], vz - wind[2]
+        if self._heading_drag:
+            forward = drag.x * (cos_yaw * vx + sin_yaw * vy)
+            left = drag.y * (cos_yaw * vy - sin_yaw * vx)
+            drag_x, drag_y = cos_yaw * forward - sin_yaw * left, sin_yaw * forward + cos_yaw * left
+        else:
+            drag_x, drag_y = drag.x * vx, drag.y * vy
+        return force[0] - drag_x, force[1] - drag_y, force[2] - drag.z * vz - self.preset.gravity
+
+    def _slide(self, force: Vector) -> None:
+        """Advance on the ground: friction carries what pushes sideways, up to its limit."""
+        h = self.preset.step
+        self.on_ground = True
+        vx, vy = self.velocity[0], self.velocity[1]
+        grip = h * self.preset.ground_friction * (self.preset.gravity - force[2])
+        px, py = vx + h * force[0], vy + h * force[1]
+        speed = math.hypot(px, py)
+        keep = 1.0 - grip / speed if speed > grip else 0.0
+        x, y, _ = self.position
+        next_vx, next_vy = keep * px, keep * py
+        self.position = (x + 0.5 * h * (vx + next_vx), y + 0.5 * h * (vy + next_vy), 0.0)
+        self.velocity = (next_vx, next_vy, 0.0)
+        self.acceleration = ((next_vx - vx) / h, (next_vy - vy) / h, 0.0)

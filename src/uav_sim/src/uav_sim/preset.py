@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: MIT
+"""What the simulated aircraft is: parameters of plant, link and flight controller."""
+
+import math
+from dataclasses import dataclass, field
+from typing import List, Union
+
+from uav_sim.config import config_directory, from_dict, load_yaml
+from uav_sim.errors import ConfigError
+
+PACKET_PERIOD = 0.01  # [s] between two packets of the M100's serial link (dji_sdk.md 2.1)
+
+
+def _number(low: float = 0.0, high: float = math.inf) -> float:
+    return field(metadata={"min": low, "max": high})
+
+
+@dataclass(frozen=True)
+class FirstOrder:
+    """Response ``time_constant * x' = gain * reference - x``."""
+
+    gain: float = _number()  # [1]
+    time_constant: float = _number(1e-3)  # [s]
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """Response ``x'' = omega^2 (gain * reference - x) - 2 zeta omega x'``."""
+
+    gain: float = _number()  # [1]
+    omega: float = _number(1e-3)  # [rad/s]
+    zeta: float = _number()  # [1]
+
+
+Response = Union[FirstOrder, SecondOrder]
+
+
+@dataclass(frozen=True)
+class Thrust:
+    """Affine map from DJI's thrust percentage to acceleration along body z."""
+
+    slope: float = _number(1e-6)  # [m/s^2 per percent]
+    offset: float = _number(-math.inf)  # [m/s^2]
+
+    def acceleration(self, percent: float) -> float:
+        """Return the acceleration [m/s^2] of a percentage; propellers never push, 0 is idle."""
+        return max(0.0, self.slope * percent + self.offset) if percent > 0.0 else 0.0
+
+    def percent(self, acceleration: float) -> float:
+        """Return the percentage for an acceleration [m/s^2]."""
+        return (acceleration - self.offset) / self.slope
+
+
+@dataclass(frozen=True)
+class Drag:
+    """Linear drag: deceleration per speed relative to the air, along the axes of a frame."""
+
+    frame: str = field(metadata={"choices": ("heading", "world")})  # heading: forward, left, up
+    x: float = _number()  # [1/s]
+    y: float = _number()  # [1/s]
+    z: float = _number()  # [1/s]
+
+
+@dataclass(frozen=True)
+class Delay:
+    """Dead times of the link, one per channel of the command and one for all telemetry."""
+
+    attitude: float = _number()  # [s]
+    thrust: float = _number()  # [s]
+    yaw_rate: float = _number()  # [s]
+    telemetry: float = _number()  # [s]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Range of setpoints that the flight controller follows, beside the tilt limit."""
+
+    yaw_rate: float = _number()  # [rad/s]
+    thrust_min: float = _number(0.0, 100.0)  # [percent]
+    thrust_max: float = _number(0.0, 100.0)  # [percent]
+    vertical_velocity: float = _number()  # [m/s]
+    horizontal_velocity: float = _number()  # [m/s]
+    height: float = _number()  # [m] above take-off
+
+
+@dataclass(frozen=True)
+class RcValues:
+    """Raw values of the RC's mode switch (P, A, F) and landing gear switch."""
+
+    P: float = _number(-math.inf)
+    A: float = _number(-math.inf)
+    F: float = _number(-math.inf)
+    gear_up: float = _number(-math.inf)
+    gear_down: float = _number(-math.inf)
+
+
+@dataclass(frozen=True)
+class Loops:
+    """Gains of the flight controller's own velocity, position, height and heading loops."""
+
+    position: float = _number()  # [1/s]
+    velocity: float = _number()  # [1/s]
+    integral: float = _number()  # [1/s^2]
+    height: float = _number()  # [1/s]
+    vertical_velocity: float = _number()  # [1/s]
+    vertical_integral: float = _number()  # [1/s^2]
+    trim_limit: float = _number()  # [m/s^2]
+    yaw: float = _number()  # [1/s]
+    anchor_speed: float = _number()  # [m/s]
+
+
+@dataclass(frozen=True)
+class FlightController:
+    """Behaviour of the flight controller; what each number rests on stands in ``common.yaml``."""
+
+    cmd_timeout: float = _number()  # [s]
+    clamp: bool = field()
+    setpoints_need_air: bool = field()
+    limits: Limits = field()
+    takeoff_height: float = _number()  # [m]
+    takeoff_speed: float = _number()  # [m/s]
+    spin_up_time: float = _number()  # [s]
+    landing_speed: float = _number(0.05)  # [m/s]
+    descent_speed: float = _number(0.05)  # [m/s]
+    descent_time_constant: float = _number(1e-3)  # [s]
+    touchdown_time: float = _number()  # [s]
+    landed_time: float = _number()  # [s]
+    go_home_height: float = _number()  # [m]
+    rc_lost_time: float = _number()  # [s]
+    rc: RcValues = field()
+    loops: Loops = field()
+
+
+@dataclass(frozen=True)
+class GeoPoint:
+    """A place on earth."""
+
+    latitude: float = _number(-90.0, 90.0)  # [deg]
+    longitude: float = _number(-180.0, 180.0)  # [deg]
+    altitude: float = _number(-math.inf)  # [m]
+
+
+@dataclass(frozen=True)
+class PlantPreset:
+    """Everything that makes one simulated M100 different from another."""
+
+    name: str
+    mass: float = _number(0.1)  # [kg]
+    radius: float = _number()  # [m] hull: centre to the outermost propeller tip
+    roll: Response = field()
+    pitch: Response = field()
+    yaw_rate: Response = field()
+    thrust: Thrust = field()
+    drag: Drag = field()
+    tilt_limit: float = _number()  # [rad] norm of the commanded (roll, pitch)
+    delay: Delay = field()
+    step: float = _number(1e-4, PACKET_PERIOD)  # [s]
+    gravity: float = _number()  # [m/s^2]
+    gravity_const: float = _number()  # [m/s^2 per g] scale of the accelerometer
+    ground_friction: float = _number()  # [1]
+    flight_time: float = _number(1.0)  # [s] a full battery lasts with motors on
+    home: GeoPoint = field()  # the world's origin
+    flight_controller: FlightController = field()
+
+    @property
+    def hover_percent(self) -> float:
+        """Thrust percentage that carries the nominal aircraft."""
+        return self.thrust.percent(self.gravity)
+
+
+def preset_names() -> List[str]:
+    """Return the names of the presets that exist."""
+    return sorted(path.stem for path in (config_directory() / "presets").glob("*.yaml"))
+
+
+def load_preset(name: str) -> PlantPreset:
+    """Return the preset of ``config/presets/<name>.yaml`` with the rest from ``common.yaml``.
+
+    Raises:
+        ConfigError: no such preset, or one that is wrong.
+    """
+    if name not in preset_names():
+        raise ConfigError("preset", "name", name, f"one of {', '.join(preset_names())}")
+    directory = config_directory()
+    path = directory / "presets" / f"{name}.yaml"
+    data = {**load_yaml(directory / "common.yaml"), **load_yaml(path)}
+    preset = from_dict(PlantPreset, data, path.name)
+    steps = PACKET_PERIOD / preset.step
+    if abs(steps - round(steps)) > 1e-9:
+        raise ConfigError(path.name, "step", preset.step, f"a divisor of {PACKET_PERIOD} s")
+    return preset

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: MIT
+"""What the M100's serial link brings to dji_sdk: packets at 100 Hz after the link's dead time.
+
+Order, rates, frames, units and signs follow dji_sdk.md section 2; a packet is stamped on receipt.
+"""
+
+import math
+from collections import deque
+from typing import Any, Deque, List, NamedTuple, Optional, Tuple
+
+from uav_sim.plant import Plant, Vector
+from uav_sim.preset import GeoPoint
+
+EARTH_RADIUS = 6378137.0  # [m] of dji_sdk's flat-earth conversion (2.2)
+REFERENCE_GPS = 3  # set_local_pos_ref needs a gps_health above this (section 4)
+
+_MEDIUM, _SLOW = 2, 10  # packets from one sending to the next: 50 and 10 Hz
+
+
+class Packet(NamedTuple):
+    """One message: the topic below ``dji_sdk/``, its stamp and its value."""
+
+    topic: str
+    t: float  # [s]
+    value: Any  # see Telemetry
+
+
+class Imu(NamedTuple):
+    """Value of ``imu``."""
+
+    orientation: Tuple[float, float, float, float]  # x, y, z, w, body FLU to ENU
+    angular_velocity: Vector  # [rad/s] body FLU
+    linear_acceleration: Vector  # [m/s^2] specific force, body FLU: +9.8 on z at rest
+
+
+def quaternion(roll: float, pitch: float, yaw: float) -> Tuple[float, float, float, float]:
+    """Return x, y, z, w of roll, pitch, yaw [rad] about x, y, z."""
+    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def body_rates(rpy: Vector, rpy_rates: Vector) -> Vector:
+    """Return the angular velocity (3,) [rad/s] in body axes from Euler angles and their rates."""
+    (roll, pitch, _), (d_roll, d_pitch, d_yaw) = rpy, rpy_rates
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    return (d_roll - d_yaw * sp, d_pitch * cr + d_yaw * cp * sr, d_yaw * cp * cr - d_pitch * sr)
+
+
+def to_body(rpy: Vector, vector: Vector) -> Vector:
+    """Return a world vector (3,) in body axes."""
+    (roll, pitch, yaw), (x, y, z) = rpy, vector
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    ahead, left = cy * x + sy * y, cy * y - sy * x
+    down_tilted = sp * ahead + cp * z
+    return (cp * ahead - sp * z, cr * left + sr * down_tilted, cr * down_tilted - sr * left)
+
+
+class LocalFrame:
+    """dji_sdk's flat earth: positions on earth, and local ones once a reference is set."""
+
+    def __init__(self, home: GeoPoint) -> None:
+        self.home = home
+        self.reference: Optional[GeoPoint] = None
+
+    def to_earth(self, position: Vector) -> GeoPoint:
+        """Return the place of a world position (3,) [m]; ``to_local`` from home inverts it."""
+        home = self.home
+        latitude = home.latitude + math.degrees(position[1] / EARTH_RADIUS)
+        circle = EARTH_RADIUS * math.cos(math.radians(latitude))
+        longitude = home.longitude + math.degrees(position[0] / circle)
+        return GeoPoint(latitude, longitude, home.altitude + position[2])
+
+    def to_local(self, place: GeoPoint) -> Vector:
+        """Return east, north, up [m] of a place from the reference, as dji_sdk computes them."""
+        reference = self.reference
+        circle = EARTH_RADIUS * math.cos(math.radians(place.latitude))
+        return (
+            math.radians(place.longitude - reference.longitude) * circle,
+            math.radians(place.latitude - reference.latitude) * EARTH_RADIUS,
+            place.altitude - reference.altitude,
+        )
+
+
+class Telemetry:
+    """Samples a plant and delivers packets after the link's dead time.
+
+    Values: ``attitude`` x, y, z, w; ``imu`` Imu; ``velocity`` [m/s], ``local_position`` [m] and
+    ``gimbal_angle`` [deg] (3,); ``gps_position`` and ``local_frame_ref`` GeoPoint; ``rc`` six axes;
+    ``gps_health``, ``flight_status``; ``height_above_takeoff`` [m]; ``battery_state`` [percent].
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        self.frame = LocalFrame(plant.preset.home)
+        self._plant = plant
+        self._delay = plant.preset.delay.telemetry
+        self._scale = plant.preset.gravity_const / plant.preset.gravity
+        self._count = 0
+        self._pending: Deque[Packet] = deque()
+        self._place: Optional[GeoPoint] = None  # newest gps_position and gps_health received
+        self._health = 0
+
+    def set_local_position_reference(self, t: float) -> bool:
+        """Make the newest GPS position the origin of ``local_position``; a refusal clears it."""
+        if self._place is None or self._health <= REFERENCE_GPS:
+            self.frame.reference = None
+            return False
+        self._refer(t, self._place)
+        return True
+
+    def refer_to_home(self, t: float) -> None:
+        """Make the world's origin that of ``local_position``, whatever has been received."""
+        self._refer(t, self.frame.home)
+
+    def sample(
+        self,
+        t: float,
+        *,
+        rc: Tuple[float, ...],
+        gps_health: int,
+        height: float,
+        flight_status: int,
+        battery: float,
+    ) -> None:
+        """Send the packet of time ``t`` [s]; to be called every 0.01 s.
+
+        Args:
+            t: time of sampling [s].
+            rc: six axes.
+            gps_health: 0..5.
+            height: above take-off [m].
+            flight_status: of the M100's enumeration.
+            battery: state of charge [percent].
+        """
+        count, plant = self._count, self._plant
+        self._count += 1
+        rpy = plant.rpy
+        attitude = quaternion(*rpy)
+        ax, ay, az = plant.acceleration
+        force = to_body(rpy, (ax, ay, az + plant.preset.gravity))
+        scale = self._scale
+        acceleration = (scale * force[0], scale * force[1], scale * force[2])
+        imu = Imu(attitude, body_rates(rpy, plant.rpy_rates), acceleration)
+        values: List[Tuple[str, Any]] = [("attitude", attitude), ("imu", imu)]
+        if count % _MEDIUM == 0:
+            place = self.frame.to_earth(plant.position)
+            values.insert(0, ("rc", rc))
+            values += [("gps_health", gps_health), ("gps_position", place)]
+            if self.frame.reference is not None:
+                values.append(("local_position", self.frame.to_local(place)))
+            values += [("height_above_takeoff", height), ("velocity", plant.velocity)]
+        if count % _SLOW == 0:
+            values.append(("battery_state", battery))
+        if count % _MEDIUM == 0:
+            heading = 90.0 - math.degrees(rpy[2])
+            gimbal = (0.0, 0.0, math.remainder(heading, 360.0))
+            values += [("flight_status", flight_status), ("gimbal_angle", gimbal)]
+        received = t + self._delay
+        self._pending.extend(Packet(topic, received, value) for topic, value in values)
+
+    def due(self, t: float) -> List[Packet]:
+        """Return the packets received until ``t`` [s], oldest first."""
+        pending, packets = self._pending, []
+        while pending and pending[0].t <= t + 1e-9:
+            packet = pending.popleft()
+            if packet.topic == "gps_position":
+                self._place = packet.value
+            elif packet.topic == "gps_health":
+                self._health = packet.value
+            packets.append(packet)
+        return packets
+
+    def _refer(self, t: float, place: GeoPoint) -> None:
+        self.frame.reference = place
+        self._pending.appendleft(Packet("local_frame_ref", t, place))

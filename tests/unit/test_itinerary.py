@@ -1,0 +1,95 @@
+"""Sequence of references: hold, approach, settle, trajectory, hold."""
+
+import numpy as np
+import pytest
+
+from nmpc_control.itinerary import Itinerary
+from nmpc_control.params import load_parameters
+from nmpc_control.state import POSITION, VELOCITY, YAW, Goal
+from nmpc_control.trajectory import line
+
+START, END = np.array([5.0, 0.0, 2.0]), np.array([11.0, 0.0, 2.0])
+REST = np.zeros(3)
+
+
+@pytest.fixture
+def itinerary() -> Itinerary:
+    i = Itinerary(load_parameters().flight)
+    i.hold(np.zeros(3), 0.3)
+    return i
+
+
+def follow(itinerary: Itinerary, t: float, until: float, dt: float = 0.05) -> float:
+    """Move a perfect follower along the reference; returns the time reached."""
+    while t < until:
+        x = itinerary.reference(np.array([t]))[0]
+        itinerary.update(t, x[POSITION], x[VELOCITY])
+        t += dt
+    return t
+
+
+def test_hold_is_the_same_at_all_times(itinerary):
+    x = itinerary.reference(np.array([0.0, 5.0, 100.0]))
+    assert np.all(x[:, POSITION] == 0.0)
+    assert np.all(x[:, YAW] == 0.3)
+    assert np.isnan(itinerary.reference_time(3.0))
+
+
+def test_trajectory_begins_after_the_approach_has_settled(itinerary):
+    itinerary.fly(0.0, np.zeros(3), 0.3, line(START, END, speed=1.5))
+    leg = 5.0 / itinerary.flight.approach_speed
+    follow(itinerary, 0.0, leg)
+    assert itinerary.goal is Goal.APPROACH
+    follow(itinerary, leg, leg + 20.0)
+    assert itinerary.clock_start is None or itinerary.clock_start >= leg + itinerary.flight.settle_time
+
+
+def test_the_reference_does_not_look_into_the_trajectory_before_its_clock_runs(itinerary):
+    itinerary.fly(0.0, np.zeros(3), 0.0, line(START, END, speed=1.5))
+    far = itinerary.reference(np.array([1000.0]))[0]
+    assert far[POSITION] == pytest.approx(START)
+
+
+def test_whole_flight_ends_arrived_and_holds_the_end(itinerary):
+    itinerary.fly(0.0, np.zeros(3), 0.0, line(START, END, speed=1.5))
+    t = follow(itinerary, 0.0, 30.0)
+    assert itinerary.goal is Goal.HOLD
+    assert itinerary.outcome.arrived
+    assert itinerary.reference(np.array([t]))[0, POSITION] == pytest.approx(END)
+
+
+def test_clock_of_the_trajectory_runs_whatever_the_aircraft_does(itinerary):
+    itinerary.begin(10.0, line(START, END, speed=1.5))
+    itinerary.update(12.0, np.array([-50.0, 0, 0]), REST)
+    assert itinerary.reference_time(12.0) == pytest.approx(2.0)
+    assert itinerary.reference(np.array([12.0]))[0, POSITION] == pytest.approx([8.0, 0.0, 2.0])
+
+
+def test_not_reaching_the_end_is_said(itinerary):
+    itinerary.begin(0.0, line(START, END, speed=1.5))
+    t = 4.0 + itinerary.flight.arrival_timeout
+    itinerary.update(t, START, REST)
+    assert itinerary.goal is Goal.TRAJECTORY
+    itinerary.update(t + 0.1, START, REST)
+    assert itinerary.goal is Goal.HOLD
+    assert not itinerary.outcome.arrived
+    assert "not reached" in itinerary.outcome.message
+
+
+def test_passing_the_end_at_speed_is_no_arrival(itinerary):
+    itinerary.begin(0.0, line(START, END, speed=1.5))
+    itinerary.update(4.5, END, np.array([0.5, 0.0, 0.0]))
+    assert itinerary.goal is Goal.TRAJECTORY
+    itinerary.update(4.6, END, np.array([0.1, 0.0, 0.0]))
+    assert itinerary.outcome.arrived
+
+
+def test_go_to_arrives_and_hold_interrupts(itinerary):
+    itinerary.go_to(0.0, np.zeros(3), 0.0, START, 1.0)
+    follow(itinerary, 0.0, 15.0)
+    assert itinerary.outcome.arrived
+    assert itinerary.reference(np.array([20.0]))[0, YAW] == pytest.approx(1.0)
+    itinerary.go_to(20.0, START, 1.0, END, 1.0)
+    itinerary.hold(START, 1.0)
+    assert not itinerary.outcome.arrived
+    assert itinerary.goal is Goal.HOLD

@@ -1,0 +1,110 @@
+"""The symbolic model against exact solutions, SciPy's integrator and the plain-float twin."""
+
+import dataclasses
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from nmpc_control import prediction
+from nmpc_control.model import INTEGRATORS, MODEL_SIZE, continuous, model_parameters, step_function
+from nmpc_control.params import load_vehicle
+from nmpc_control.state import GRAVITY, NU, NX, hover_input, hover_state
+
+VEHICLES = ("dji_hil", "eth", "paper")
+DT = 0.1  # [s] the paper's
+
+
+def call(function: ca.Function, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
+    return np.asarray(function(x, u, p)).ravel()
+
+
+def random_state(rng: np.random.Generator) -> np.ndarray:
+    return rng.normal(0, [3, 3, 3, 0.2, 0.2, 1.5, 2, 2, 1, 0.5])
+
+
+def random_input(rng: np.random.Generator) -> np.ndarray:
+    return rng.uniform([5, -0.4, -0.4, -1], [15, 0.4, 0.4, 1])
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_hover_is_an_equilibrium(integrator):
+    p = model_parameters(load_vehicle("dji_hil"))
+    x = hover_state(np.array([1.0, -2.0, 3.0]), yaw=0.7)
+    assert call(step_function(DT, integrator), x, hover_input(), p) == pytest.approx(x, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_exact_lag_is_within_one_percent_of_the_exact_solution_for_every_lag(name):
+    vehicle = load_vehicle(name)
+    F = step_function(DT, "exact_lag")
+    u = np.array([GRAVITY, 0.3, 0.2, 0.5])
+    x = call(F, hover_state(np.zeros(3)), u, model_parameters(vehicle))
+    for index, lag, target in ((3, vehicle.roll, 0.3), (4, vehicle.pitch, 0.2), (9, vehicle.yaw_rate, 0.5)):
+        exact = lag.gain * target * (1 - np.exp(-DT / lag.time_constant))
+        assert x[index] == pytest.approx(exact, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_exact_lag_agrees_with_scipy_over_one_step(name):
+    vehicle = load_vehicle(name)
+    p = model_parameters(vehicle, np.array([0.3, -0.2, 0.1]))
+    x_symbol, u_symbol, p_symbol = ca.SX.sym("x", NX), ca.SX.sym("u", NU), ca.SX.sym("p", MODEL_SIZE)
+    f = ca.Function("f", [x_symbol, u_symbol, p_symbol], [continuous(x_symbol, u_symbol, p_symbol)])
+    F = step_function(DT, "exact_lag")
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        x, u = random_state(rng), random_input(rng)
+        exact = solve_ivp(lambda t, y: call(f, y, u, p), (0, DT), x, rtol=1e-10, atol=1e-12).y[:, -1]  # noqa: B023
+        # 1 % of the speed that the thrust gives in one step
+        assert call(F, x, u, p) == pytest.approx(exact, abs=0.01 * u[0] * DT)
+        assert call(F, x, u, p)[3:6] == pytest.approx(exact[3:6], abs=1e-8)
+
+
+def test_one_euler_step_is_unstable_for_the_papers_lags_and_the_exact_one_is_not():
+    p = model_parameters(load_vehicle("paper"))
+    tilted = hover_state(np.zeros(3))
+    tilted[3] = 0.1
+    factors = {i: call(step_function(DT, i), tilted, hover_input(), p)[3] / 0.1 for i in ("euler", "exact_lag")}
+    assert factors["euler"] == pytest.approx(-1.41, abs=0.01)
+    assert 0 < factors["exact_lag"] < 1
+
+
+@pytest.mark.parametrize("axis", (0, 1, 2))
+def test_speed_decays_under_drag(axis):
+    vehicle = load_vehicle("dji_hil")
+    x = hover_state(np.zeros(3))
+    x[6 + axis] = 3.0
+    after = call(step_function(DT), x, hover_input(), model_parameters(vehicle))
+    assert after[6 + axis] == pytest.approx(3.0 * np.exp(-vehicle.drag[axis] * DT), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("index", "tilt", "sign"), [(3, 0.1, (0, -1)), (4, 0.1, (1, 0))], ids=["roll to the right", "pitch forward"]
+)
+def test_tilt_accelerates_in_the_direction_of_the_dji_signs(index, tilt, sign):
+    x = hover_state(np.zeros(3))
+    x[index] = tilt
+    u = hover_input()
+    u[index - 2] = tilt
+    v = call(step_function(DT), x, u, model_parameters(load_vehicle("dji_hil")))[6:8]
+    assert v == pytest.approx(np.array(sign) * GRAVITY * np.sin(tilt) * DT, abs=0.01)
+
+
+def test_the_plain_float_twin_makes_the_same_step():
+    rng = np.random.default_rng(2)
+    for name in VEHICLES:
+        vehicle = load_vehicle(name)
+        p = model_parameters(vehicle)
+        for _ in range(10):
+            x, u = random_state(rng), random_input(rng)
+            assert call(step_function(DT), x, u, p) == pytest.approx(prediction.step(x, u, DT, vehicle), abs=2e-3)
+
+
+def test_disturbance_is_an_acceleration_in_the_world_frame():
+    vehicle = dataclasses.replace(load_vehicle("dji_hil"), drag=np.zeros(3))
+    d = np.array([0.5, -0.3, 0.2])
+    after = call(step_function(DT), hover_state(np.zeros(3)), hover_input(), model_parameters(vehicle, d))
+    assert after[6:9] == pytest.approx(d * DT)
+    assert after[:3] == pytest.approx(d * DT**2 / 2)
