@@ -33,7 +33,7 @@ test: lint
 
 lint: build
 	@.venv/bin/ruff check --quiet --output-format concise .
-	@.venv/bin/ruff format --quiet --check .
+	@.venv/bin/ruff format --quiet --check --output-format concise .
 	@$(in_workspace) .venv/bin/catkin_lint -W2 --strict --offline src
 
 clean:

@@ -61,7 +61,7 @@ def xyz(vector):
 
 
 class BagBuilder:
-    """Collects (topic, type, time of recording, values) and writes them in the order of time."""
+    """Collects (topic, type, time of recording, raw message), writes them in the order of time."""
 
     def __init__(self, prefix="", delay=0.003):
         self.prefix = prefix
@@ -70,7 +70,8 @@ class BagBuilder:
 
     def add(self, topic, msgtype, t, values, recorded=None):
         recorded = t + self.delay if recorded is None else recorded
-        self.messages.append((f"{self.prefix}/{topic}", msgtype, recorded, values))
+        raw = bytes(STORE.serialize_ros1(build(msgtype, values), msgtype))
+        self.messages.append((f"{self.prefix}/{topic}", msgtype, recorded, raw))
 
     def odometry(self, topic, t, position, velocity, yaw=0.0):
         pose = {
@@ -114,17 +115,19 @@ class BagBuilder:
         values = {"header": header(t), "obstacles": obstacles}
         self.add(topic, "nmpc_msgs/msg/ObstacleArray", t, values)
 
-    def write(self, path, without=(), keep_order=False):
-        """Write the bag without the topics whose names end as given; return its path."""
-        messages = [m for m in self.messages if not m[0].endswith(tuple(without) or ("\0",))]
-        if not keep_order:
-            messages = sorted(messages, key=lambda m: m[2])
+    def without(self, *suffixes):
+        """Return a builder with the same messages but those of topics that end like this."""
+        other = BagBuilder(self.prefix, self.delay)
+        other.messages = [m for m in self.messages if not m[0].endswith(suffixes)]
+        return other
+
+    def write(self, path):
+        """Write the bag; return its path."""
         with Writer(path) as writer:
             connections = {}
-            for topic, msgtype, t, values in messages:
+            for topic, msgtype, t, raw in sorted(self.messages, key=lambda m: m[2]):
                 if topic not in connections:
                     connections[topic] = writer.add_connection(topic, msgtype, typestore=STORE)
-                raw = STORE.serialize_ros1(build(msgtype, values), msgtype)
                 writer.write(connections[topic], round(t * 1e9), raw)
         return path
 
@@ -156,28 +159,27 @@ class Flight:
         return FLYING if t < self.start + self.duration else HOVERING
 
     def build(self, prefix="", name="line"):
-        """Return all topics of the flight: state at 100 Hz, commands at 50 Hz, plans at 10 Hz."""
+        """Return all topics of the flight: state and commands at 50 Hz, plans at 10 Hz."""
         bag = BagBuilder(prefix)
         times = np.arange(0.0, self.duration + 0.025, 0.05)
         path = [self.reference(self.start + t) for t in times]
-        bag.obstacles(98.0, self.spheres)
-        bag.trajectory(106.0, 0.0, name, times, path)
+        bag.obstacles(self.take_off - 2.0, self.spheres)
+        bag.trajectory(self.take_off + 6.0, 0.0, name, times, path)
         bag.trajectory(self.start, self.start, name, times, path)
-        for k in range(9800, 14100):
-            t = k / 100.0
+        for k in range(round(50 * self.take_off) - 100, round(50 * self.end) + 50):
+            t = k / 50.0
             position = self.reference(t) + self.offset
             bag.odometry("nmpc/odometry", t, position, self.velocity(t), yaw=1.0)
             bag.odometry("uav_sim/ground_truth", t, position + self.drift, self.velocity(t))
-            if k % 2 == 0:
-                mode = self.mode(t)
-                bag.status(t, mode, plans_rejected=k // 1000, deadline_misses=k // 100)
-                bag.add("dji_sdk/flight_status", "std_msgs/msg/UInt8", t, {"data": self.phase(t)})
-                if mode in (FLYING, HOVERING):
-                    bag.setpoint(t, 0.1, -0.1, 38.0 + 0.1 * (k % 7), 0.2)
-            if k % 10 == 0:
+            mode = self.mode(t)
+            bag.status(t, mode, plans_rejected=k // 500, deadline_misses=k // 50)
+            if mode in (FLYING, HOVERING):
+                bag.setpoint(t, 0.1, -0.1, 38.0 + 0.1 * (k % 7), 0.2)
+            if k % 5 == 0:
                 reference = {"header": header(t), "pose": {"position": xyz(self.reference(t))}}
                 bag.add("nmpc/reference", "geometry_msgs/msg/PoseStamped", t, reference)
-                bag.plan(t, k // 10 % 3, 0.001 * (1 + k // 10 % 5))
+                bag.add("dji_sdk/flight_status", "std_msgs/msg/UInt8", t, {"data": self.phase(t)})
+                bag.plan(t, k // 5 % 3, 0.001 * (1 + k // 5 % 5))
         return bag
 
     def phase(self, t):

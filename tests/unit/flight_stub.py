@@ -6,16 +6,21 @@ from collections import deque
 
 import numpy as np
 
-from nmpc_control.dji import VELOCITY as VELOCITY_FLAG
-from nmpc_control.dji import FlightStatus, RcMode, input_from_axes
+from nmpc_control.dji import (
+    ATTITUDE_VERTICAL_VELOCITY,
+    VELOCITY,
+    FlightStatus,
+    RcMode,
+    input_from_axes,
+)
 from nmpc_control.estimator import StateEstimate
 from nmpc_control.guard import Guard
 from nmpc_control.guard_data import Action, GuardInputs
 from nmpc_control.guard_params import load_guard_parameters
-from nmpc_control.mode_inputs import Goal, Mode, ModeInputs, Request
+from nmpc_control.mode_inputs import Mode, ModeInputs, Request
 from nmpc_control.params import load_parameters
 from nmpc_control.prediction import step
-from nmpc_control.state import NU, Plan, hover_input, hover_state
+from nmpc_control.state import GRAVITY, NU, Goal, Plan, hover_input, hover_state
 
 TICK = 0.02  # [s]
 PARAMS = load_guard_parameters()
@@ -88,13 +93,18 @@ class Aircraft:
             return
         u = np.array(self._acting)
         if len(u) == 5:
-            u = np.array(self._hold() if u[4] == VELOCITY_FLAG else input_from_axes(u, VEHICLE))
+            u = self._input(u)
         u[0] += self.thrust_error
         self.x = np.array(step(self.x, u, TICK, self.vehicle))
 
-    def _hold(self):
-        self.x[6:9] *= np.exp(-TICK / 0.3)
-        return hover_input()
+    def _input(self, axes):
+        if axes[4] == VELOCITY:
+            self.x[6:9] += (axes[:3] - self.x[6:9]) * TICK / 0.3
+            return hover_input()
+        if axes[4] == ATTITUDE_VERTICAL_VELOCITY:
+            self.x[8] += (axes[2] - self.x[8]) * TICK / 0.3
+            return np.array([GRAVITY, axes[0], axes[1], axes[3]])
+        return np.array(input_from_axes(axes, VEHICLE))
 
 
 class Flight:
@@ -108,17 +118,19 @@ class Flight:
         self.change = {}  # telemetry that differs from good
         self.obstacles = ()
         self.log = []  # (t, inputs, output)
-        self.velocity_at = None  # the last one that the guard may see, None: the true one
 
     def tick(self, request=None, **changes):
         self.t = round(self.t + TICK, 6)
         x = self.aircraft.x.copy()
         telemetry = dataclasses.replace(
             GOOD,
-            flight_status=self.aircraft.status,
-            authority=self.aircraft.authority,
-            request=request,
-            **{**self.change, **changes},
+            **{
+                "flight_status": self.aircraft.status,
+                "authority": self.aircraft.authority,
+                "request": request,
+                **self.change,
+                **changes,
+            },
         )
         offered, goal = None, Goal.HOLD
         if round(self.t / TICK) % 3 == 0 and self.solver is not None:

@@ -13,12 +13,12 @@ from nmpc_control.mode_inputs import (
     AUTOMATIC,
     PLANNED,
     STREAMING,
-    Goal,
     Mode,
     Request,
     preflight,
 )
 from nmpc_control.modes import RULES, answer, next_mode
+from nmpc_control.state import Goal
 
 P = PARAMS.modes
 WARM = dataclasses.replace(

@@ -197,7 +197,7 @@ BALL = GOOD["obstacles"][0]
         (reference(points=[[0, 0, 2], [1, 0]]), "reference.points[1]: got [1, 0]"),
         (reference(points=[[0, 0, 2], [1, 0, NAN]]), "reference.points[1]: got [1, 0, nan]"),
         (reference(points=[[0, 0, 2], [1, 0, "2"]]), "reference.points[1]"),
-        (reference(points=[[0, 0, 2], [1, 0, 2]]), "reference.degree: got 3"),
+        (reference(points=[[0, 0, 2], [1, 0, 2]], degree=3), "reference.degree: got 3"),
         (reference(points=[[0, 0, 2], [0, 0, 2], [1, 0, 2], [2, 0, 2]]), "reference.points[1]"),
         (reference(degree=0), "reference.degree: got 0"),
         (reference(degree=2.0), "reference.degree: got 2.0"),

@@ -26,8 +26,9 @@ class BrakeParameters:
     velocity_gain: float = _positive()  # [1/s] horizontal
     position_gain: float = _non_negative()  # [1/s^2] horizontal, towards where it came to rest
     vertical_velocity_gain: float = _positive()  # [1/s]
-    vertical_position_gain: float = _non_negative()  # [1/s^2] towards the height where it began
-    thrust_adaptation: float = _non_negative()  # [1/s^2] integral of vertical velocity
+    height_gain: float = _non_negative()  # [1/s] climb rate per height, to where it began
+    vertical_speed: float = _positive()  # [m/s] of that climb or descent, at most
+    thrust_adaptation: float = _non_negative()  # [1/s^2] integral of the vertical speed's error
     deceleration: float = _positive()  # [m/s^2] horizontal, at most
     vertical_acceleration: float = _positive()  # [m/s^2] at most, adaptation included
     tilt_rate: float = _positive()  # [rad/s] of each attitude reference, at most
@@ -59,34 +60,35 @@ class Brake:
             dt: [s] since the last call.
             has_position: whether the position in the state is to be trusted.
         """
-        p = self.params
-        position, velocity = state[POSITION], state[VELOCITY]
-        horizontal = -p.velocity_gain * velocity[:2]
-        vertical = -p.vertical_velocity_gain * velocity[2]
-        self._thrust_bias -= p.thrust_adaptation * velocity[2] * dt
-        if has_position:
-            horizontal = horizontal + p.position_gain * (
-                self._resting_place(state)[:2] - position[:2]
-            )
-            vertical += p.vertical_position_gain * (self._height - position[2])
-        else:
+        if not has_position:
             self._rest = self._height = None
-        horizontal = _shorten(horizontal, p.deceleration)
-        bound = p.vertical_acceleration
-        self._thrust_bias = min(max(self._thrust_bias, -bound), bound)
-        vertical = min(max(vertical + self._thrust_bias, -bound), bound)
+        horizontal = self._horizontal(state, has_position)
+        vertical = self._vertical(state, dt, has_position)
         self._previous = self._limited(
             self._thrust_vector_input(horizontal, vertical, state[YAW]), dt
         )
         return self._previous.copy()
 
-    def _resting_place(self, state: np.ndarray) -> np.ndarray:
-        position, velocity = state[POSITION], state[VELOCITY]
-        if self._height is None:
-            self._height = float(position[2])
-        if self._rest is None and math.hypot(velocity[0], velocity[1]) <= self.params.rest_speed:
+    def _horizontal(self, state: np.ndarray, has_position: bool) -> np.ndarray:
+        """Return the acceleration (2,) [m/s^2] against velocity, and back to the resting place."""
+        p = self.params
+        position, velocity = state[POSITION][:2], state[VELOCITY][:2]
+        if has_position and self._rest is None and math.hypot(*velocity) <= p.rest_speed:
             self._rest = position.copy()
-        return position if self._rest is None else self._rest
+        offset = np.zeros(2) if self._rest is None else self._rest - position
+        return _shorten(p.position_gain * offset - p.velocity_gain * velocity, p.deceleration)
+
+    def _vertical(self, state: np.ndarray, dt: float, has_position: bool) -> float:
+        """Return the acceleration [m/s^2] that holds the height, learning what hover takes."""
+        p = self.params
+        height, velocity = float(state[POSITION][2]), float(state[VELOCITY][2])
+        if has_position and self._height is None:
+            self._height = height
+        wanted = 0.0 if self._height is None else p.height_gain * (self._height - height)
+        error = _clamp(wanted, p.vertical_speed) - velocity
+        bound = p.vertical_acceleration
+        self._thrust_bias = _clamp(self._thrust_bias + p.thrust_adaptation * error * dt, bound)
+        return _clamp(p.vertical_velocity_gain * error + self._thrust_bias, bound)
 
     def _thrust_vector_input(
         self, horizontal: np.ndarray, vertical: float, yaw: float
@@ -110,3 +112,7 @@ class Brake:
 def _shorten(vector: np.ndarray, limit: float) -> np.ndarray:
     norm = math.hypot(vector[0], vector[1])
     return vector if norm <= limit else vector * (limit / norm)
+
+
+def _clamp(value: float, bound: float) -> float:
+    return min(max(value, -bound), bound)

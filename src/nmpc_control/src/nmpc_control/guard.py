@@ -157,7 +157,7 @@ class Guard:
             return 0.0
         speed = float(np.linalg.norm(self._last_good.vector[VELOCITY][:2]))
         needed = speed / p.brake.deceleration + self.vehicle.delay
-        return self._last_good.t + p.modes.velocity_timeout + needed - i.t
+        return self._last_good.t + needed - i.t
 
     def _change_mode(
         self, i: GuardInputs, seen: ModeInputs, answer: Optional[Tuple[bool, str]]

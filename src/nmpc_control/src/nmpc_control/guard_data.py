@@ -9,8 +9,8 @@ from typing import Optional, Sequence, Tuple
 from nmpc_control.dji import Axes
 from nmpc_control.estimator import StateEstimate
 from nmpc_control.ladder import Rung
-from nmpc_control.mode_inputs import Goal, Mode, ModeInputs
-from nmpc_control.state import Obstacle, Plan
+from nmpc_control.mode_inputs import Mode, ModeInputs
+from nmpc_control.state import Goal, Obstacle, Plan
 
 
 class Action(Enum):

@@ -6,7 +6,7 @@ from typing import Optional, Sequence, Tuple
 
 from nmpc_control import dji
 from nmpc_control.estimator import Estimator
-from nmpc_control.guard import GuardInputs
+from nmpc_control.guard_data import GuardInputs
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.mode_inputs import ModeInputs, Request
 from nmpc_control.state import Goal, Obstacle, Plan

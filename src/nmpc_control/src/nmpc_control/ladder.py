@@ -7,7 +7,6 @@ from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
-from nmpc_control.mode_inputs import Goal
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.plan_check import (
     Finding,
@@ -16,7 +15,7 @@ from nmpc_control.plan_check import (
     check_flown,
     check_plan,
 )
-from nmpc_control.state import Obstacle, Plan
+from nmpc_control.state import Goal, Obstacle, Plan
 
 
 class Rung(IntEnum):

@@ -14,13 +14,13 @@ from nmpc_control.mode_inputs import (
     PLANNED,
     STARTABLE,
     STREAMING,
-    Goal,
     Mode,
     ModeInputs,
     ModeParameters,
     Request,
     preflight,
 )
+from nmpc_control.state import Goal
 
 
 @dataclass(frozen=True)

@@ -159,7 +159,7 @@ class Waypoints:
     method: str = field(
         default="interpolate", metadata={"choices": ("interpolate", "approximate", "fit")}
     )
-    degree: int = field(default=3, metadata={"min": 1, "max": 9})
+    degree: Optional[int] = field(default=None, metadata={"min": 1, "max": 9})  # 3, or what the points allow
     knots: Any = "uniform"
     ends: Optional[str] = None  # interpolate: not_a_knot (default) or natural
     closed: bool = False
@@ -169,7 +169,9 @@ class Waypoints:
     def build(self, pace: Pace, yaw: Yaw) -> Trajectory:
         """Return the trajectory."""
         _refuse_yaw_list(yaw, self.closed)
-        options: Dict[str, Any] = {"degree": self.degree, "knots": self.knots}
+        points = _points(self.points)
+        degree = self.degree or (3 if self.ends == "natural" else min(3, max(1, len(points) - 1)))
+        options: Dict[str, Any] = {"degree": degree, "knots": self.knots}
         if self.ends is not None:
             options["ends"] = self._only("interpolate", "ends")
         if self.control_points is not None:
@@ -186,7 +188,7 @@ class Waypoints:
             "fit": BSpline.fit,
         }[self.method]
         return trajectory.waypoints(
-            _points(self.points),
+            points,
             pace.speed,
             pace.duration,
             self.timing,

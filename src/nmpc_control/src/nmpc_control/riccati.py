@@ -9,9 +9,10 @@ law du = k + K [dx; du_before]. Forward: the model is rolled out under that law 
 clipped to their bounds, so every iterate satisfies dynamics and bounds exactly.
 """
 
-from typing import List, Tuple
+from typing import List, Optional, Tuple
 
 import casadi as ca
+import numpy as np
 
 from nmpc_control.ocp import THETA_SIZE, Structure, Symbols, next_state, residuals, stage_cost
 from nmpc_control.state import NU, NX
@@ -20,20 +21,22 @@ NZ = NX + NU  # state of the recursion: x and the input before
 _ACTIVE_TOLERANCE = 1e-9  # [input unit] distance at which an input counts as on its bound
 
 
-def sweeps(structure: Structure) -> Tuple[ca.Function, ca.Function]:
-    """Return the functions ``backward`` and ``forward`` over the whole horizon.
+def sweeps(structure: Structure) -> Tuple[ca.Function, ca.Function, ca.Function]:
+    """Return the functions ``backward``, ``backward_exact`` and ``forward`` over the whole horizon.
 
     backward(X (10, N+1), U (4, N), u_before (4,), stages, theta, damping) ->
-        gains (4, 14 N), step (4, N), summary (4,): slope and curvature of the predicted cost change along the
-        step, largest projected gradient (scaled by the input ranges), number of active bounds
+        gains (4, 14 N), step (4, N), summary (4,): slope of the cost along the step, largest projected
+        gradient (scaled by the input ranges), number of active bounds, least pivot of the recursion
+    backward_exact: the same with the exact Hessian of the Lagrangian, which need not be positive: the least
+        pivot says whether its step may be used
     forward(x0 (10,), u_before (4,), X, U, gains, step, alpha, stages, theta) -> X_new, U_new, cost
     """
-    return _backward(structure), _forward(structure)
+    return _backward(structure, False), _backward(structure, True), _forward(structure)
 
 
-def _backward(structure: Structure) -> ca.Function:
+def _backward(structure: Structure, exact: bool) -> ca.Function:
     N = structure.horizon
-    last, inner = _terminal_model(structure), _stage_backward(structure)
+    last, inner = _terminal_model(structure, exact), _stage_backward(structure, exact)
     X, U = ca.MX.sym("X", NX, N + 1), ca.MX.sym("U", NU, N)
     u_before, stages = ca.MX.sym("u_before", NU), ca.MX.sym("stages", structure.stage_size, N + 1)
     theta, damping = ca.MX.sym("theta", THETA_SIZE), ca.MX.sym("damping")
@@ -41,14 +44,14 @@ def _backward(structure: Structure) -> ca.Function:
     P, s, adjoint = last(xs[N], data[N], theta)
     gains: List[ca.MX] = [None] * N
     step: List[ca.MX] = [None] * N
-    summary = ca.MX.zeros(4)
+    summary = ca.MX([0.0, 0.0, 0.0, np.inf])
     for k in reversed(range(N)):
         before = us[k - 1] if k else u_before
         gains[k], step[k], P, s, adjoint, summary = inner(
             xs[k], us[k], before, data[k], theta, damping, P, s, adjoint, summary
         )
     return ca.Function(
-        "backward",
+        "backward_exact" if exact else "backward",
         [X, U, u_before, stages, theta, damping],
         [ca.horzcat(*gains), ca.horzcat(*step), summary],
         ["X", "U", "u_before", "stages", "theta", "damping"],
@@ -56,18 +59,18 @@ def _backward(structure: Structure) -> ca.Function:
     )
 
 
-def _terminal_model(structure: Structure) -> ca.Function:
+def _terminal_model(structure: Structure, exact: bool) -> ca.Function:
     s = Symbols(structure)
     r, w = residuals(structure, s, terminal=True)
     J = ca.jacobian(r, s.x)
     gradient = 2 * J.T @ (w * r)
     P = ca.SX(NZ, NZ)
-    P[:NX, :NX] = 2 * J.T @ (ca.diag(w) @ J)
+    P[:NX, :NX] = ca.hessian(ca.dot(w, r * r), s.x)[0] if exact else 2 * J.T @ (ca.diag(w) @ J)
     adjoint = ca.vertcat(gradient, ca.SX.zeros(NU))
     return ca.Function("terminal_model", [s.x, s.stage, s.theta], [_upper(P), adjoint, adjoint])
 
 
-def _stage_backward(structure: Structure) -> ca.Function:
+def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
     s = Symbols(structure)
     damping = ca.SX.sym("damping")
     P_half = ca.SX.sym("P", NZ * (NZ + 1) // 2)
@@ -82,7 +85,7 @@ def _stage_backward(structure: Structure) -> ca.Function:
     z = ca.vertcat(s.x, s.u_before)
     Jz, Ju = ca.jacobian(r, z), ca.jacobian(r, s.u)
     cost_z, cost_u = 2 * Jz.T @ (w * r), 2 * Ju.T @ (w * r)
-    W = ca.diag(w)
+    Hzz, Huz, Huu = _hessian(r, w, ca.dot(adjoint[:NX], x_next) if exact else None, z, s.u)
 
     # exact gradient of the cost along the dynamics, and the bounds that hold an input
     gradient = cost_u + B.T @ adjoint[:NX] + adjoint[NX:]
@@ -91,18 +94,16 @@ def _stage_backward(structure: Structure) -> ca.Function:
     free = 1 - ca.logic_or(held_low, held_high)
     adjoint_before = cost_z + ca.vertcat(A.T @ adjoint[:NX], ca.SX.zeros(NU))
 
-    # Gauss-Newton model of the cost to go in (dz, du)
+    # quadratic model of the cost to go in (dz, du)
     PA, BP = Pxx @ A, B.T @ Pxx + Pxu.T
-    Qzz = 2 * Jz.T @ (W @ Jz)
+    Qzz, Quz, Quu = Hzz, Huz, Huu + BP @ B + B.T @ Pxu + Puu
     Qzz[:NX, :NX] += A.T @ PA
-    Quz = 2 * Ju.T @ (W @ Jz)
     Quz[:, :NX] += BP @ A
-    Quu = 2 * Ju.T @ (W @ Ju) + BP @ B + B.T @ Pxu + Puu
     qu = cost_u + B.T @ value_gradient[:NX] + value_gradient[NX:]
     qz = cost_z + ca.vertcat(A.T @ value_gradient[:NX], ca.SX.zeros(NU))
 
     F = ca.diag(free)
-    L = _cholesky(F @ (Quu + damping * ca.SX.eye(NU)) @ F + ca.diag(1 - free))
+    L, pivots = _cholesky(F @ (Quu + damping * ca.SX.eye(NU)) @ F + ca.diag(1 - free))
     step = -_solve(L, free * qu)
     gains = -_solve(L, F @ Quz)
     half = _forward_substitution(L, F @ Quz)
@@ -113,9 +114,9 @@ def _stage_backward(structure: Structure) -> ca.Function:
     violation = ca.mmax(ca.fabs(s.u - ca.fmin(ca.fmax(s.u - gradient * span**2, s.u_min), s.u_max)) / span)
     new_summary = ca.vertcat(
         summary[0] + ca.dot(free * qu, step),  # qu is the gradient under the feedback of the later stages
-        summary[1] + ca.dot(step, Quu @ step),
-        ca.fmax(summary[2], violation),
-        summary[3] + NU - ca.sum1(free),
+        ca.fmax(summary[1], violation),
+        summary[2] + NU - ca.sum1(free),
+        ca.fmin(summary[3], ca.mmin(ca.vertcat(*pivots))),
     )
     return ca.Function(
         "stage_backward",
@@ -178,15 +179,28 @@ def _symmetric(half: ca.SX) -> ca.SX:
     return P
 
 
-def _cholesky(M: ca.SX) -> ca.SX:
-    """Return the lower Cholesky factor of a small positive definite matrix, written out."""
+def _hessian(
+    r: ca.SX, w: ca.SX, dynamics: Optional[ca.SX], z: ca.SX, u: ca.SX
+) -> Tuple[ca.SX, ca.SX, ca.SX]:
+    """Return the blocks zz, uz, uu of the Hessian of w'r^2 (+ adjoint' F): exact, or Gauss-Newton without F."""
+    if dynamics is not None:
+        both = ca.vertcat(z, u)
+        H = ca.hessian(ca.dot(w, r * r) + dynamics, both)[0]
+        return H[:NZ, :NZ], H[NZ:, :NZ], H[NZ:, NZ:]
+    Jz, Ju, W = ca.jacobian(r, z), ca.jacobian(r, u), ca.diag(w)
+    return 2 * Jz.T @ (W @ Jz), 2 * Ju.T @ (W @ Jz), 2 * Ju.T @ (W @ Ju)
+
+
+def _cholesky(M: ca.SX) -> Tuple[ca.SX, List[ca.SX]]:
+    """Return the lower Cholesky factor of a small positive definite matrix, written out, and its squared pivots."""
     n = M.shape[0]
-    L = ca.SX(n, n)
+    L, pivots = ca.SX(n, n), []
     for j in range(n):
-        L[j, j] = ca.sqrt(M[j, j] - sum((L[j, i] ** 2 for i in range(j)), ca.SX(0)))
+        pivots.append(M[j, j] - sum((L[j, i] ** 2 for i in range(j)), ca.SX(0)))
+        L[j, j] = ca.sqrt(pivots[j])
         for i in range(j + 1, n):
             L[i, j] = (M[i, j] - sum((L[i, m] * L[j, m] for m in range(j)), ca.SX(0))) / L[j, j]
-    return L
+    return L, pivots
 
 
 def _forward_substitution(L: ca.SX, b: ca.SX) -> ca.SX:

@@ -93,7 +93,7 @@ def list_scenarios() -> Tuple[str, ...]:
 
 
 def scenario_path(name_or_path: str) -> Path:
-    """Return the file of a scenario: what ends in .yaml or contains a separator is a path, all else a name.
+    """Return the file of a scenario: what ends in .yaml or contains a separator is a path.
 
     Raises:
         ConfigError: no scenario of that name.

@@ -9,7 +9,7 @@ a solve cut off by its wall-time budget still returns a plan that can be flown.
 
 import logging
 import time
-from typing import Dict, Optional
+from typing import Dict, Optional, Tuple
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from nmpc_control.state import NU
 
 LOGGER = logging.getLogger(__name__)
 _ARMIJO = 1e-4
+_NEWTON_REGION = 0.02  # relative change of the cost below which the exact Hessian is tried
+_LEAST_PIVOT = 1e-6
 _SHORTEST_STEP = 1.0 / 64.0
 _DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
 _DECREASE = 1e-3  # times tolerance: a smaller predicted change of the cost, relative, counts as none
@@ -36,6 +38,7 @@ class SqpSolver:
         functions = compile_functions(sweeps(structure))
         self._arrays: Dict[str, np.ndarray] = {}
         self._backward = Buffered(functions["backward"], self._arrays)
+        self._backward_exact = Buffered(functions["backward_exact"], self._arrays)
         self._forward = Buffered(functions["forward"], self._arrays)
 
     def solve(self, instance: Instance, guess: Optional[Guess] = None) -> Solution:
@@ -51,10 +54,9 @@ class SqpSolver:
         a["stages"][:], a["theta"][:, 0] = instance.stages, instance.theta
         cost = self._begin(guess, instance)
         damping, iterations, status, residual, active = 0.0, 0, "failed", np.inf, 0
+        newton = False
         while np.isfinite(cost):
-            a["damping"][0, 0] = damping
-            self._backward()
-            slope, curvature, residual, active = a["summary"][:, 0]
+            slope, residual, active = self._direction(damping, newton)
             if residual <= self.tolerance or -slope <= _DECREASE * self.tolerance * (1.0 + abs(cost)):
                 status = "converged"
                 break
@@ -64,12 +66,13 @@ class SqpSolver:
             iterations += 1
             new_cost = self._search(cost, slope)
             if new_cost is not None:
+                newton = cost - new_cost <= _NEWTON_REGION * (1.0 + abs(cost))
                 cost, damping = new_cost, damping / _DAMPING_FACTOR if damping > _DAMPING_FIRST else 0.0
             elif slope > -_ROUNDING * (1.0 + abs(cost)) or damping >= _DAMPING_LAST:
                 status = "stalled"
                 break
             else:
-                damping = max(damping * _DAMPING_FACTOR, _DAMPING_FIRST)
+                damping, newton = max(damping * _DAMPING_FACTOR, _DAMPING_FIRST), False
         return Solution(
             found=bool(np.isfinite(cost)),
             status=status,
@@ -101,6 +104,21 @@ class SqpSolver:
                 self._accept()
                 return cost
         return np.inf
+
+    def _direction(self, damping: float, newton: bool) -> Tuple[float, float, int]:
+        """Compute step and gains; returns the slope along the step, projected gradient and active bounds.
+
+        Near a solution (``newton``) the exact Hessian converges fast; where it is not positive, Gauss-Newton is used.
+        """
+        self._arrays["damping"][0, 0] = damping
+        slope, residual, active, pivot = 0.0, np.inf, 0, 0.0
+        if newton:
+            self._backward_exact()
+            slope, residual, active, pivot = self._arrays["summary"][:, 0]
+        if not pivot > _LEAST_PIVOT or not slope <= 0.0:
+            self._backward()
+            slope, residual, active, _ = self._arrays["summary"][:, 0]
+        return slope, residual, active
 
     def _search(self, cost: float, slope: float) -> Optional[float]:
         """Take the longest of the tried steps that lowers the cost enough; None when there is none."""

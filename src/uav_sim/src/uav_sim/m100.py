@@ -61,7 +61,6 @@ class SimulatedM100:
         self.plant.place(position, velocity, yaw, airborne)
         self.autopilot.start(self.t, airborne, authority)
         self.world.reset()
-        self.world.observe(self.t, self.plant.position)
         if airborne:
             self._telemetry.refer_to_home(self.t)
 

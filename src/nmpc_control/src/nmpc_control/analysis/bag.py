@@ -10,7 +10,7 @@ from nmpc_control.analysis import recording as reading
 from nmpc_control.analysis.messages import POSITION, QUATERNION, VELOCITY
 from nmpc_control.analysis.obstacle_tracks import obstacle_tracks
 from nmpc_control.analysis.quaternions import rpy_of, to_world
-from nmpc_control.analysis.record import FlightRecord, Reference, Series
+from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Reference, Series
 from nmpc_control.analysis.recording import Event, Progress, Recording
 from nmpc_control.analysis.source import is_hardware_in_the_loop
 from nmpc_control.analysis.windows import mode_runs, run_at, runs
@@ -61,7 +61,7 @@ def read_flight(
         reference=start
         and Reference(start.stamp, Series(start.content.times, start.content.positions)),
         tracked_reference=recording.rows.get("reference"),
-        obstacles=_obstacles(recording.events, start),
+        obstacles=_obstacles(recording.events, start, automatic),
         commands=_commands(recording.rows, missing),
         solver=recording.rows.get("plan"),
         status=status,
@@ -178,9 +178,14 @@ def _automatic(
     return period
 
 
-def _obstacles(events: Dict[str, List[Event]], start: Optional[Event]) -> Optional[tuple]:
+def _obstacles(
+    events: Dict[str, List[Event]], start: Optional[Event], automatic: Optional[Period]
+) -> Optional[Tuple[ObstacleTrack, ...]]:
     messages = events.get("obstacles") or events.get("sensed_obstacles")
-    return None if messages is None else obstacle_tracks(messages, start.stamp if start else None)
+    if messages is None:
+        return None
+    end = automatic[1] if automatic else np.inf
+    return obstacle_tracks(messages, start.stamp if start else -np.inf, end)
 
 
 def _collisions(recording: Recording, automatic: Optional[Period]) -> Optional[int]:

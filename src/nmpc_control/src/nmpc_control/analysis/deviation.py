@@ -9,7 +9,7 @@ from nmpc_control.analysis.record import Reference, Series
 
 ARRIVAL_DISTANCE = 0.3  # [m] from the end of the reference
 ARRIVAL_SPEED = 0.2  # [m/s]
-_BLOCK = 2_000_000  # point-segment pairs that are held in memory at a time
+_BLOCK = 500_000  # point-segment pairs that are held in memory at a time
 
 
 def errors(position: Series, reference: Reference, start: float, end: float) -> Series:
@@ -23,16 +23,29 @@ def path_deviation(points: np.ndarray, curve: np.ndarray) -> np.ndarray:
     if len(curve) < 2:
         return np.linalg.norm(points - curve[0], axis=1)
     starts, steps = curve[:-1], np.diff(curve, axis=0)
-    squared = np.maximum(np.einsum("ij,ij->i", steps, steps), np.finfo(float).tiny)
-    distances = np.empty(len(points))
+    nearest = np.empty(len(points), dtype=int)
     block = max(1, _BLOCK // len(steps))
     for first in range(0, len(points), block):
-        offsets = points[first : first + block, None, :] - starts
-        along = np.clip(np.einsum("nij,ij->ni", offsets, steps) / squared, 0.0, 1.0)
-        offsets -= along[:, :, None] * steps
-        nearest = np.einsum("nij,nij->ni", offsets, offsets).min(axis=1)
-        distances[first : first + block] = np.sqrt(nearest)
-    return distances
+        part = slice(first, first + block)
+        nearest[part] = _nearest_segments(points[part], starts, steps)
+    offsets, steps = points - starts[nearest], steps[nearest]
+    along = np.clip(np.einsum("ij,ij->i", offsets, steps) / _squared(steps), 0.0, 1.0)
+    return np.linalg.norm(offsets - along[:, None] * steps, axis=1)
+
+
+def _nearest_segments(points: np.ndarray, starts: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return the index (n,) of the segment nearest to each point, by matrix products alone."""
+    centre = starts.mean(axis=0)
+    points, starts = points - centre, starts - centre
+    projection = points @ steps.T - np.einsum("ij,ij->i", starts, steps)
+    along = np.clip(projection / _squared(steps), 0.0, 1.0)
+    distance = np.einsum("ij,ij->i", starts, starts) - 2.0 * points @ starts.T
+    distance += along * (along * _squared(steps) - 2.0 * projection)
+    return distance.argmin(axis=1)
+
+
+def _squared(steps: np.ndarray) -> np.ndarray:
+    return np.maximum(np.einsum("ij,ij->i", steps, steps), np.finfo(float).tiny)
 
 
 def arrival_time(

@@ -116,9 +116,13 @@ def motion_figures(record: FlightRecord, window: Optional[Window], missing: List
     if len(velocity):
         speed = np.linalg.norm(velocity, axis=1)
         figures["speed_m_s"] = {"mean": speed.mean(), "max": speed.max()}
+    else:
+        missing.append("no velocities: no speed")
     if len(attitude):
         tilt = np.arccos(np.cos(attitude[:, 0]) * np.cos(attitude[:, 1]))
         figures["tilt_rad"] = {"mean": tilt.mean(), "max": tilt.max()}
+    else:
+        missing.append("no attitudes: no tilt")
     return figures
 
 

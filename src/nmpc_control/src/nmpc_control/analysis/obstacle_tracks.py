@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Where every obstacle was, and how long, from messages that list all obstacles of a moment."""
 
-from typing import Dict, List, Optional, Tuple
+from typing import Dict, List, Tuple
 
 import numpy as np
 
@@ -10,16 +10,15 @@ from nmpc_control.analysis.recording import Event
 from nmpc_control.state import Obstacle
 
 
-def obstacle_tracks(messages: List[Event], start: Optional[float]) -> Tuple[ObstacleTrack, ...]:
-    """Return the obstacles known from the start [s] of a flight on; without it, all ever known.
+def obstacle_tracks(messages: List[Event], start: float, end: float) -> Tuple[ObstacleTrack, ...]:
+    """Return the obstacles known from the start [s] of a flight to its end [s].
 
     An obstacle that is absent from a newer message is gone. The first message counts from before
     the flight.
     """
-    ordered = sorted(messages, key=_time)
-    if start is not None:
-        before = [i for i, message in enumerate(ordered) if _time(message) <= start]
-        ordered = ordered[before[-1] :] if before else ordered
+    ordered = sorted((message for message in messages if _time(message) <= end), key=_time)
+    before = [i for i, message in enumerate(ordered) if _time(message) <= start]
+    ordered = ordered[before[-1] :] if before else ordered
     seen: Dict[str, List[Tuple[float, Obstacle]]] = {}
     for message in ordered:
         for obstacle in message.content:

@@ -21,7 +21,7 @@ def reference_figures(
     figures = _deviation_figures(None, "")
     figures.update(_deviation_figures(None, "_truth"))
     figures.update(average_deviation_after_6s_m=None, average_path_deviation_m=None, rmse_m=None)
-    figures.update(_retimed_figures(record, window))
+    figures.update(_retimed_figures(record, window, missing))
     figures.update(scenario_time_s=None, reference_length_m=None)
     reference = record.reference
     if reference is None:
@@ -76,10 +76,11 @@ def _estimate_figures(
     }
 
 
-def _retimed_figures(record: FlightRecord, window: Optional[Window]) -> Metrics:
+def _retimed_figures(record: FlightRecord, window: Optional[Window], missing: List[str]) -> Metrics:
     """Return the deviation to what the controller compared with, slowed or re-timed as it was."""
     tracked, position = record.tracked_reference, record.position
     if tracked is None or position is None or window is None or not len(position):
+        missing.append("no reference or position of the controller: no deviation between the two")
         return _deviation_figures(None, "_retimed")
     start, end = max(window.start, position.times[0]), min(window.reference_end, position.times[-1])
     tracked = tracked.between(start, end)

@@ -23,10 +23,10 @@ RED: Color = (1.0, 0.20, 0.15, 1.0)
 YELLOW: Color = (1.0, 0.85, 0.10, 1.0)
 WHITE: Color = (0.95, 0.95, 0.95, 1.0)
 GREY: Color = (0.60, 0.62, 0.65, 1.0)
-OBSTACLE: Color = (0.85, 0.25, 0.10, 1.0)
-SHELL: Color = (1.0, 0.85, 0.10, 0.22)
+OBSTACLE: Color = (0.75, 0.12, 0.08, 1.0)
+SHELL: Color = (1.0, 0.85, 0.10, 0.30)
 ROOM: Color = (1.0, 0.85, 0.10, 0.55)
-HULL: Color = (0.25, 0.55, 1.0, 0.25)
+HULL: Color = (0.25, 0.55, 1.0, 0.35)
 
 ROTOR_DISTANCE = 0.325  # [m] centre to rotor axis, half of the M100's diagonal
 ROTOR_RADIUS = 0.165  # [m] 13 inch propellers
@@ -74,7 +74,7 @@ def box_edges(frame: str, ns: str, low: np.ndarray, high: np.ndarray) -> Marker:
         (a, b) for i, a in enumerate(corners) for b in corners[i + 1 :] if np.abs(a - b).sum() == 1
     ]
     ends = np.array(pairs).reshape(-1, 3)
-    return line(frame, ns, low + ends * (high - low), ROOM, 0.04, Marker.LINE_LIST)
+    return line(frame, ns, low + ends * (high - low), ROOM, 0.03, Marker.LINE_LIST)
 
 
 def obstacle(frame: str, item: Obstacle, id: int, safety_distance: float) -> List[Marker]:
@@ -115,9 +115,7 @@ def vehicle(frame: str, pose: Pose, radius: float) -> List[Marker]:
     for i, angle in enumerate(np.radians([45.0, -45.0, 135.0, -135.0])):
         tip = ROTOR_DISTANCE * np.array([math.cos(angle), math.sin(angle), 0.0])
         color = RED if i < 2 else WHITE
-        arm = line(
-            frame, "vehicle", [(0, 0, 0), tip], color, 0.06, Marker.LINE_LIST, id=1 + i
-        )
+        arm = line(frame, "vehicle", [(0, 0, 0), tip], color, 0.06, Marker.LINE_LIST, id=1 + i)
         arm.pose = pose
         rotor = _marker(frame, "vehicle", Marker.CYLINDER, color[:3] + (0.6,), 5 + i)
         rotor.pose = Pose(Point(*_moved(pose, tip + [0.0, 0.0, 0.05])), pose.orientation)

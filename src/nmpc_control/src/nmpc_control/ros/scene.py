@@ -8,11 +8,11 @@ from typing import Callable, Dict, List, Optional, Tuple
 import numpy as np
 from geometry_msgs.msg import Point, PolygonStamped, Pose
 from nav_msgs.msg import Odometry
-from nmpc_control.flown_path import FlownPath
-from nmpc_control.ros import markers
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
+from nmpc_control.flown_path import FlownPath
+from nmpc_control.ros import markers
 from nmpc_msgs.msg import ControllerStatus, ObstacleArray, Prediction
 
 MOST_OBSTACLES = 200
@@ -26,7 +26,7 @@ _MODES = {
 
 
 class Scene:
-    """Keeps the newest of everything; each ``set_...`` takes one message, markers are made on demand."""
+    """Keeps the newest of everything; markers are made when they are asked for."""
 
     def __init__(
         self, frame: str, vehicle_radius: float, safety_distance: float, text_height: float
@@ -42,7 +42,7 @@ class Scene:
         self._pose: Optional[Pose] = None
 
     def set_trajectory(self, message: MultiDOFJointTrajectory) -> None:
-        """Show the whole reference; a stamp of 0 announces a flight, another one starts its clock."""
+        """Show the whole reference; a stamp of 0 announces a flight, any other starts its clock."""
         if message.header.stamp.to_sec() > 0.0:
             self._path.start_clock(message.header.stamp.to_sec())
         else:
@@ -51,28 +51,37 @@ class Scene:
         points = _rows([point.transforms[0].translation for point in message.points])
         stride = 1 + len(points) // MOST_REFERENCE_POINTS
         shown = np.vstack([points[::stride], points[-1:]])
-        self._set("reference", self._line, "reference", shown, markers.GREEN, 0.05)
+        self._set("reference", self._line, "reference (green)", shown, markers.GREEN, 0.05)
         self._set("reference ends", self._reference_ends, points)
 
     def set_odometry(self, message: Odometry) -> None:
         """Show the aircraft and extend the flown path."""
         if self._extend(self._path, message):
             self._pose = message.pose.pose
-            self._set("flown path", self._path_line, "flown path", self._path, markers.BLUE, 0.07)
+            self._set(
+                "flown path", self._path_line, "flown path (blue)", self._path, markers.BLUE, 0.07
+            )
             self._set("times", self._times)
             self._set("vehicle", self._vehicle)
 
     def set_truth(self, message: Odometry) -> None:
         """Extend the true path, which only a simulation knows."""
         if self._extend(self._true_path, message):
-            self._set("true path", self._path_line, "true path", self._true_path, markers.GREY, 0.02)
+            self._set(
+                "true path",
+                self._path_line,
+                "true path (grey)",
+                self._true_path,
+                markers.GREY,
+                0.02,
+            )
 
     def set_prediction(self, message: Prediction) -> None:
         """Show the predicted path and the reference over the same time."""
         predicted = _rows([pose.position for pose in message.poses])
-        self._set("prediction", self._line, "prediction", predicted, markers.RED, 0.08)
+        self._set("prediction", self._line, "prediction (red)", predicted, markers.RED, 0.08)
         wanted = _rows(message.references)
-        self._set("horizon", self._line, "reference over horizon", wanted, markers.YELLOW, 0.08)
+        self._set("horizon", self._line, "horizon (yellow)", wanted, markers.YELLOW, 0.08)
 
     def set_obstacles(self, message: ObstacleArray) -> None:
         """Show these obstacles and no others."""
@@ -136,7 +145,7 @@ class Scene:
             return []
         places = np.array([place for _, place in self._path.labels])
         return [markers.dots(self._frame, "time dots", places, markers.WHITE, 0.18)] + [
-            self._text("times", f"{clock:g} s", place, 0.35, markers.WHITE, i)
+            self._text("times", f"{clock:g}s", place, 0.35, markers.WHITE, i)
             for i, (clock, place) in enumerate(self._path.labels)
         ]
 
@@ -170,10 +179,10 @@ class Scene:
             return []
         words = _MODES.get(message.mode, f"mode {message.mode}")
         if math.isfinite(message.reference_time):
-            words += f"  {message.reference_time:.1f} s"
+            words += f" {message.reference_time:.1f}s"
         elif message.mode in (ControllerStatus.MODE_WAITING, ControllerStatus.MODE_FAULT):
             words += f": {message.reason}"
-        return [self._text("mode", words, _row(self._pose.position), 0.9)]
+        return [self._text("mode", words, _row(self._pose.position), 1.3)]
 
     def _text(
         self,

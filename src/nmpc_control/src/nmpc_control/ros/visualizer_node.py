@@ -14,7 +14,7 @@ ROS Parameters:
     ~frame_id (str, world): frame of everything.
     ~vehicle (str, dji_hil): file under config/vehicles, for the radius of the hull.
     ~rate (float, 10) [Hz, wall time]: how often changes are drawn.
-    ~text_height (float, 0.45) [m].
+    ~text_height (float, 0.6) [m].
 """
 
 import sys
@@ -24,12 +24,12 @@ from typing import Callable
 import rospy
 from geometry_msgs.msg import PolygonStamped
 from nav_msgs.msg import Odometry
-from nmpc_control.errors import NmpcError
-from nmpc_control.params import load_parameters
-from nmpc_control.ros.scene import Scene
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
+from nmpc_control.errors import NmpcError
+from nmpc_control.params import load_parameters
+from nmpc_control.ros.scene import Scene
 from nmpc_msgs.msg import ControllerStatus, ObstacleArray, Prediction
 
 _REFRESH_PERIOD = 2.0  # [s] after which everything is drawn again, for viewers that missed a part
@@ -44,7 +44,7 @@ class VisualizerNode:
             frame=rospy.get_param("~frame_id", "world"),
             vehicle_radius=parameters.vehicle.radius,
             safety_distance=parameters.avoidance.safety_distance,
-            text_height=rospy.get_param("~text_height", 0.45),
+            text_height=rospy.get_param("~text_height", 0.6),
         )
         self._lock = threading.Lock()
         self._period = 1.0 / max(0.1, rospy.get_param("~rate", 10.0))

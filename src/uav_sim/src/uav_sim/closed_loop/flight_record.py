@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Log of a simulated flight as the record that the offline metrics read."""
 
-from typing import Dict, List
+from typing import Dict, List, Tuple
 
 import numpy as np
 from nmpc_control import dji
@@ -19,7 +19,7 @@ def record_of(scenario: Scenario, log: Log, collisions: int) -> FlightRecord:
     """Return the record of a flight; its clock is the simulation's."""
     steps, outputs = log.steps, log.outputs
     solved = np.array([step.estimate.t for step in steps])
-    thrust = [(t, output.axes) for t, output in outputs if output.axes and output.axes[4] == dji.ATTITUDE_THRUST]
+    sent = [(t, output.axes) for t, output in outputs if output.axes]
     duration = scenario.trajectory.duration
     times = np.linspace(0.0, duration, _REFERENCE_SAMPLES)
     truth_times = np.array([truth.t for truth in log.truths])
@@ -30,21 +30,35 @@ def record_of(scenario: Scenario, log: Log, collisions: int) -> FlightRecord:
         velocity=Series(solved, [step.estimate.vector[VELOCITY] for step in steps]),
         attitude=Series(solved, [step.estimate.vector[3:6] for step in steps]),
         true_position=Series(truth_times, [truth.position for truth in log.truths]),
-        reference=Reference(log.clock_start, Series(times, scenario.trajectory.sample(times).position)),
+        reference=Reference(
+            log.clock_start, Series(times, scenario.trajectory.sample(times).position)
+        ),
         tracked_reference=Series(solved, [step.reference[POSITION] for step in steps]),
         obstacles=tuple(ObstacleTrack(obstacle) for obstacle in scenario.obstacles),
-        commands=Series([t for t, _ in thrust], [(axes[2], axes[0], axes[1], axes[3]) for _, axes in thrust]),
-        solver=Series(solved, [(s.plan.iterations, s.plan.solve_time, s.plan.found) for s in steps]),
+        commands=Series([t for t, _ in sent], [_command(axes) for _, axes in sent]),
+        solver=Series(
+            solved, [(s.plan.iterations, s.plan.solve_time, s.plan.found) for s in steps]
+        ),
         status=Series([t for t, _ in outputs], [(output.mode, 0, 0) for _, output in outputs]),
+        airborne=(outputs[0][0], log.end),
         automatic=(outputs[0][0], log.end),
         phase_end=log.end,
         reported_collisions=collisions,
     )
 
 
+def _command(axes: dji.Axes) -> Tuple[float, float, float, float]:
+    """Return thrust [percent], roll, pitch [rad], yaw rate [rad/s] of setpoint axes, NaN where not given."""
+    if axes[4] != dji.ATTITUDE_THRUST:
+        return (np.nan, np.nan, np.nan, axes[3])
+    return (axes[2], axes[0], axes[1], axes[3])
+
+
 def world_of(scenario: Scenario, radius: float) -> World:
     """Return the simulator's own world with the scenario's obstacles around a hull of a radius [m]."""
-    return World.from_list([_entry(obstacle) for obstacle in scenario.obstacles], radius, scenario.name)
+    return World.from_list(
+        [_entry(obstacle) for obstacle in scenario.obstacles], radius, scenario.name
+    )
 
 
 def _entry(obstacle: Obstacle) -> Dict[str, object]:

@@ -45,14 +45,34 @@ def main(argv: Optional[List[str]] = None) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="fly", description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("scenario", nargs="?", default="multi_obstacle", help="name of a scenario, or path of a YAML file")
-    parser.add_argument("--plant", default="dji_hil", help="plant preset of the simulator (default: %(default)s)")
+    parser = argparse.ArgumentParser(
+        prog="fly", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument(
+        "scenario",
+        nargs="?",
+        default="multi_obstacle",
+        help="name of a scenario, or path of a YAML file",
+    )
+    parser.add_argument(
+        "--plant", default="dji_hil", help="plant preset of the simulator (default: %(default)s)"
+    )
     parser.add_argument("--vehicle", help="the controller's model of it (default: as the plant)")
-    parser.add_argument("--backend", default="compiled", choices=["compiled", "ipopt"], help="solver")
-    parser.add_argument("--avoidance", default="on", choices=["on", "off"], help="off: fly into obstacles")
-    parser.add_argument("--speed", type=float, default=1.0, help="simulated seconds per second (default: %(default)s)")
-    parser.add_argument("--bags", type=Path, default=Path("bags"), help="folder for bag, JSON and report")
+    parser.add_argument(
+        "--backend", default="compiled", choices=["compiled", "ipopt"], help="solver"
+    )
+    parser.add_argument(
+        "--avoidance", default="on", choices=["on", "off"], help="off: fly into obstacles"
+    )
+    parser.add_argument(
+        "--speed",
+        type=float,
+        default=1.0,
+        help="simulated seconds per second (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--bags", type=Path, default=Path("bags"), help="folder for bag, JSON and report"
+    )
     parser.add_argument("--rviz", action="store_true", help="open RViz")
     return parser
 
@@ -62,18 +82,33 @@ def _fly(options: argparse.Namespace, scenario: Scenario, bag: Path) -> int:
     environment = _environment()
     path = scenario_path(options.scenario).resolve()
     launch = [
-        "roslaunch", "-p", environment["ROS_MASTER_URI"].rsplit(":", 1)[1], "uav_sim", "fly.launch",
-        f"scenario:={path}", f"scenario_file:={path}", f"plant:={options.plant}",
-        f"vehicle:={options.vehicle or options.plant}", f"backend:={options.backend}",
-        f"avoidance:={str(options.avoidance == 'on').lower()}", f"speed:={options.speed}",
-        f"bag:={bag.resolve()}", f"rviz:={str(options.rviz).lower()}",
+        "roslaunch",
+        "-p",
+        environment["ROS_MASTER_URI"].rsplit(":", 1)[1],
+        "uav_sim",
+        "fly.launch",
+        f"scenario:={path}",
+        f"scenario_file:={path}",
+        f"plant:={options.plant}",
+        f"vehicle:={options.vehicle or options.plant}",
+        f"backend:={options.backend}",
+        f"avoidance:={str(options.avoidance == 'on').lower()}",
+        f"speed:={options.speed}",
+        f"bag:={bag.resolve()}",
+        f"rviz:={str(options.rviz).lower()}",
     ]
     log = bag.with_suffix(".log")
-    _say(f"flying {scenario.name} on {options.plant}, ROS_MASTER_URI={environment['ROS_MASTER_URI']}, log {log}")
+    _say(
+        f"flying {scenario.name} on {options.plant}, ROS_MASTER_URI={environment['ROS_MASTER_URI']}, log {log}"
+    )
     with open(log, "w", encoding="utf-8") as output:
-        nodes = subprocess.Popen(launch, stdout=output, stderr=output, env=environment, start_new_session=True)
+        nodes = subprocess.Popen(
+            launch, stdout=output, stderr=output, env=environment, start_new_session=True
+        )
         operator = subprocess.Popen(
-            ["rosrun", "nmpc_control", "fly_scenario", scenario.name], env=environment, start_new_session=True
+            ["rosrun", "nmpc_control", "fly_scenario", scenario.name],
+            env=environment,
+            start_new_session=True,
         )
         try:
             while operator.poll() is None:
@@ -96,14 +131,27 @@ def _judge(bag: Path, operator_status: int) -> int:
     if not bag.exists():
         _fail(f"{bag}: no bag was recorded, see {bag.with_suffix('.log')}")
     figures = bag.with_suffix(".json")
-    command = ["rosrun", "nmpc_control", "flight_metrics", str(bag), "--json", str(figures), "--report", str(bag.parent)]
+    command = [
+        "rosrun",
+        "nmpc_control",
+        "flight_metrics",
+        str(bag),
+        "--json",
+        str(figures),
+        "--report",
+        str(bag.parent),
+    ]
     if subprocess.run(command, check=False).returncode != 0:
         _fail(f"{bag}: no metrics")
     metrics = json.loads(figures.read_text(encoding="utf-8"))
     _say(f"bag {bag}\n     metrics {figures}\n     report {bag.with_suffix('.html')}")
     good = operator_status == 0 and metrics["arrived"] and metrics["collisions"] == 0
-    _say("arrived, hit nothing" if good else f"NOT as it should: arrived {metrics['arrived']}, "
-         f"collisions {metrics['collisions']}, operator ended with {operator_status}")
+    _say(
+        "arrived, hit nothing"
+        if good
+        else f"NOT as it should: arrived {metrics['arrived']}, "
+        f"collisions {metrics['collisions']}, operator ended with {operator_status}"
+    )
     return 0 if good else 1
 
 

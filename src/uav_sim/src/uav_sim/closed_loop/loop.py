@@ -6,7 +6,8 @@ from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import numpy as np
 from nmpc_control.controller import Controller, Step
-from nmpc_control.guard import Action, Guard, GuardOutput
+from nmpc_control.guard import Guard
+from nmpc_control.guard_data import Action, GuardOutput
 from nmpc_control.guard_inbox import GuardInbox
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.mode_inputs import STREAMING, Request
@@ -37,7 +38,11 @@ class ClosedLoop:
     """One vehicle under automatic control; ``step`` advances all of it by one step of the plant."""
 
     def __init__(
-        self, preset: PlantPreset, world: World, parameters: Parameters, guard_parameters: GuardParameters
+        self,
+        preset: PlantPreset,
+        world: World,
+        parameters: Parameters,
+        guard_parameters: GuardParameters,
     ) -> None:
         self.aircraft = SimulatedM100(preset, world)
         self.controller = Controller(parameters)
@@ -138,7 +143,11 @@ def fly(
     """
     loop.aircraft.place(scenario.initial_position, yaw=scenario.start_yaw)
     loop.controller.obstacles = loop.inbox.obstacles = scenario.obstacles
-    while loop.guard.mode not in STREAMING or not loop.controller.engaged or loop.guard.mode.name == "BRAKING":
+    while (
+        loop.guard.mode not in STREAMING
+        or not loop.controller.engaged
+        or loop.guard.mode.name == "BRAKING"
+    ):
         loop.inbox.request = Request.START
         loop.step()
         if loop.t > _START_TIMEOUT:

@@ -59,47 +59,72 @@ def simulate(scenario: Scenario, parameters: Parameters, plant: str, quiet: bool
     Raises:
         ConfigError: a preset that does not exist.
     """
-    radius = parameters.vehicle.radius
-    world = world_of(scenario, radius)
-    loop = ClosedLoop(load_preset(plant), world, parameters, load_guard_parameters())
+    loop = new_loop(scenario, parameters, plant)
     with Progress(disable=quiet, transient=True) as bar:
         task = bar.add_task(f"{scenario.name} on {plant}", total=1.0)
         log = fly(scenario, loop, on_progress=lambda progress: bar.update(task, completed=progress))
-    metrics = flight_metrics(record_of(scenario, log, len(loop.aircraft.collisions)), radius)
+    metrics = flight_metrics(
+        record_of(scenario, log, len(loop.aircraft.collisions)), parameters.vehicle.radius
+    )
     metrics["plant"] = plant
     metrics["clearance_truth_m"] = dict(loop.aircraft.clearance)
     metrics["plans_rejected"] = loop.guard.ladder.rejected
     return metrics
 
 
+def new_loop(scenario: Scenario, parameters: Parameters, plant: str) -> ClosedLoop:
+    """Return aircraft and control among a scenario's obstacles, before the flight; raises ConfigError."""
+    world = world_of(scenario, parameters.vehicle.radius)
+    return ClosedLoop(load_preset(plant), world, parameters, load_guard_parameters())
+
+
 def _prepare(options: argparse.Namespace) -> Tuple[Scenario, Parameters]:
     variant = options.variant
     if variant is None and options.plant == _PAPER:
-        variant = _PAPER if _PAPER in (load_yaml(scenario_path(options.scenario)).get("variants") or {}) else None
+        variant = (
+            _PAPER
+            if _PAPER in (load_yaml(scenario_path(options.scenario)).get("variants") or {})
+            else None
+        )
     scenario = load_scenario(options.scenario, variant=variant)
     load_preset(options.plant)
-    parameters = load_parameters(options.vehicle or options.plant, options.weights or scenario.weights)
+    parameters = load_parameters(
+        options.vehicle or options.plant, options.weights or scenario.weights
+    )
     radius = options.vehicle_radius
     if radius is None:
         radius = 0.0 if variant == _PAPER and options.plant == _PAPER else parameters.vehicle.radius
     return scenario, dataclasses.replace(
         parameters,
         vehicle=dataclasses.replace(parameters.vehicle, radius=radius),
-        solver=dataclasses.replace(parameters.solver, backend=options.backend or parameters.solver.backend),
+        solver=dataclasses.replace(
+            parameters.solver, backend=options.backend or parameters.solver.backend
+        ),
         avoidance=dataclasses.replace(parameters.avoidance, enabled=options.avoidance == "on"),
     )
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="simulate", description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog="simulate", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     parser.add_argument("scenario", help="name of a scenario, or path of a YAML file")
-    parser.add_argument("--plant", default="dji_hil", choices=preset_names(), help="simulated aircraft (default: %(default)s)")
+    parser.add_argument(
+        "--plant",
+        default="dji_hil",
+        choices=preset_names(),
+        help="simulated aircraft (default: %(default)s)",
+    )
     parser.add_argument("--vehicle", help="the controller's model of it (default: as the plant)")
     parser.add_argument("--variant", help="variant of the scenario")
     parser.add_argument("--weights", help="weight preset (default: the scenario's)")
     parser.add_argument("--backend", choices=["compiled", "ipopt"], help="solver")
-    parser.add_argument("--avoidance", default="on", choices=["on", "off"], help="off: fly into obstacles")
-    parser.add_argument("--vehicle-radius", type=_radius, help="hull [m] (default: the vehicle's 0.5)")
+    parser.add_argument(
+        "--avoidance", default="on", choices=["on", "off"], help="off: fly into obstacles"
+    )
+    parser.add_argument(
+        "--vehicle-radius", type=_radius, help="hull [m] (default: the vehicle's 0.5)"
+    )
     parser.add_argument("--json", type=Path, help="write the metrics to this file")
     parser.add_argument("--quiet", action="store_true", help="no progress, no table")
     return parser

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: MIT
+"""Steps of simulated time on the wall clock, without drift."""
+
+import time
+from typing import Callable
+
+MAX_LAG = 0.2  # [s] of wall time that is caught up; what is lost beyond it stays lost
+
+
+class Pacer:
+    """Says when the next step is due, counted from the first, so that lateness is caught up."""
+
+    def __init__(
+        self,
+        step: float,
+        speed_factor: float,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.lost = 0.0  # [s] of wall time given up because the machine was too slow
+        self._period = step / speed_factor if speed_factor > 0.0 else 0.0
+        self._clock = clock
+        self._sleep = sleep
+        self._epoch = clock()
+        self._steps = 0
+
+    def wait(self) -> None:
+        """Return when the next step is due; with speed factor 0 after a turn for other threads."""
+        if self._period == 0.0:
+            self._sleep(0.0)
+            return
+        self._steps += 1
+        remaining = self._epoch + self._steps * self._period - self._clock()
+        if remaining > 0.0:
+            self._sleep(remaining)
+        elif remaining < -MAX_LAG:
+            self._epoch -= remaining
+            self.lost -= remaining
