@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """Publishes what a flight in progress looks like, for nmpc_visualizer and a look at RViz.
 
-Usage: fake_flight.py SCENARIO SECONDS. Flies quickly from the origin to SECONDS after the start of the
-trajectory's clock, keeps clear of obstacles on the way as a controller would, then stays there.
+Usage: fake_flight.py SCENARIO SECONDS. Flies quickly from the origin to SECONDS after the start of
+the trajectory's clock, round obstacles as a controller would, then stays there.
 """
 
 import sys
@@ -35,7 +35,7 @@ SHAPES = {"sphere": Obstacle.SPHERE, "cylinder": Obstacle.CYLINDER, "box": Obsta
 
 
 def flown(scenario: Scenario, t: np.ndarray) -> np.ndarray:
-    """Return plausible positions (M, 3) [m]: the reference, pushed 1 m off obstacles, a little off."""
+    """Return plausible positions (M, 3) [m]: the reference, a little off and round obstacles."""
     points = scenario.trajectory.sample(t).position
     wobble = np.stack([np.sin(1.3 * t), np.cos(1.1 * t) - 1.0, 0.5 * np.sin(0.7 * t)], axis=1)
     points = points + 0.08 * wobble

@@ -57,6 +57,8 @@ class Client:
             for suffix in ("generic", "ENUvelocity_yawrate")
         }
         self.wait(lambda: len(self.newest) == len(TOPICS) - 1, 20.0)
+        for publisher in self.setpoint.values():
+            self.wait(lambda p=publisher: p.get_num_connections() > 0, 20.0)
 
     def _on_message(self, message, name):
         self.newest[name] = message

@@ -1,15 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The markers of a flight: right place, right size, bounded number, gone when they should be."""
 
-import json
-import os
-import socket
-import subprocess
 import sys
 import time
 from collections import Counter
 from pathlib import Path
-from typing import Dict, Iterator, List, Tuple
+from typing import Any, List, Tuple
 
 import numpy as np
 import pytest
@@ -274,53 +270,13 @@ def test_a_full_path_is_thinned_evenly_and_keeps_both_ends() -> None:
     assert len(set(np.diff(times))) == 1
 
 
-COLLECT = """
-import json, rospy
-from visualization_msgs.msg import MarkerArray
-rospy.init_node("viewer")
-seen = {}
-def take(array):
-    for marker in array.markers:
-        seen.setdefault(marker.ns, set()).add(marker.id)
-rospy.Subscriber("nmpc/markers", MarkerArray, take)
-rospy.rostime.wallsleep(4.0)
-print(json.dumps({ns: len(ids) for ns, ids in seen.items()}))
-"""
-
-
-@pytest.fixture
-def master() -> Iterator[Dict[str, str]]:
-    """Start a ROS master on a free port; gives the environment that reaches it."""
-    with socket.socket() as listener:
-        listener.bind(("localhost", 0))
-        port = str(listener.getsockname()[1])
-    environment = dict(
-        os.environ, ROS_MASTER_URI=f"http://localhost:{port}", ROS_HOSTNAME="localhost"
-    )
-    process = subprocess.Popen(["rosmaster", "--core", "-p", port], env=environment)
-    yield environment
-    process.terminate()
-    process.wait(10)
-
-
 @pytest.mark.ros
-def test_the_node_draws_a_flight_for_a_viewer_that_comes_late(master: Dict[str, str]) -> None:
-    node = HERE.parents[1] / "src" / "nmpc_control" / "nodes" / "nmpc_visualizer"
-    processes = [
-        subprocess.Popen([sys.executable, *map(str, arguments)], env=master)
-        for arguments in ([node], [HERE / "fake_flight.py", "multi_obstacle", "7"])
-    ]
-    try:
-        time.sleep(5.0)
-        viewer = subprocess.run(
-            [sys.executable, "-c", COLLECT], env=master, capture_output=True, text=True, check=True
-        )
-    finally:
-        for process in processes:
-            process.terminate()
-            process.wait(10)
-    seen = json.loads(viewer.stdout.splitlines()[-1])
-    assert seen == {
+def test_the_node_draws_a_flight_for_a_viewer_that_comes_late(ros: Any) -> None:
+    ros.launch("nmpc_control", "monitor.launch", rviz=False)
+    ros.start(sys.executable, str(HERE / "fake_flight.py"), "multi_obstacle", "7")
+    ros.wait_for_node("/nmpc_visualizer")
+    time.sleep(2.0)  # the room and the reference have long been sent
+    assert ros.run_json("marker_viewer.py") == {
         "reference (green)": 1,
         "reference ends": 2,
         "flown path (blue)": 1,

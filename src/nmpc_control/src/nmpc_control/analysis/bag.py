@@ -181,9 +181,7 @@ def _automatic(
 def _obstacles(
     events: Dict[str, List[Event]], start: Optional[Event], automatic: Optional[Period]
 ) -> Optional[Tuple[ObstacleTrack, ...]]:
-    messages = events.get("obstacles") or events.get("sensed_obstacles")
-    if messages is None:
-        return None
+    messages = events.get("obstacles") or events.get("sensed_obstacles") or []
     end = automatic[1] if automatic else np.inf
     return obstacle_tracks(messages, start.stamp if start else -np.inf, end)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Where every obstacle was, and how long, from messages that list all obstacles of a moment."""
 
-from typing import Dict, List, Tuple
+from typing import Dict, List, Optional, Tuple
 
 import numpy as np
 
@@ -10,13 +10,17 @@ from nmpc_control.analysis.recording import Event
 from nmpc_control.state import Obstacle
 
 
-def obstacle_tracks(messages: List[Event], start: float, end: float) -> Tuple[ObstacleTrack, ...]:
+def obstacle_tracks(
+    messages: List[Event], start: float, end: float
+) -> Optional[Tuple[ObstacleTrack, ...]]:
     """Return the obstacles known from the start [s] of a flight to its end [s].
 
     An obstacle that is absent from a newer message is gone. The first message counts from before
-    the flight.
+    the flight. None where no message tells.
     """
     ordered = sorted((message for message in messages if _time(message) <= end), key=_time)
+    if not ordered:
+        return None
     before = [i for i, message in enumerate(ordered) if _time(message) <= start]
     ordered = ordered[before[-1] :] if before else ordered
     seen: Dict[str, List[Tuple[float, Obstacle]]] = {}

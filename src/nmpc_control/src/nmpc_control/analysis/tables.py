@@ -69,7 +69,8 @@ def as_text(flights: Sequence[Metrics]) -> str:
     for title, rows in tables:
         lines += ["", title]
         lines += [_line(label, cells, labels, columns) for label, cells in rows]
-    for flight, name in zip(flights, header):
+    for flight in flights:
+        name = flight["bag"] or "flight"
         lines += [""] + [f"{name}: {sentence}" for sentence in flight["missing"]]
     return "\n".join(line.rstrip() for line in lines).rstrip() + "\n"
 

@@ -16,7 +16,7 @@ from std_msgs.msg import Header
 
 from nmpc_control.errors import NmpcError
 from nmpc_control.plan_check import MAX_HORIZON
-from nmpc_control.rotations import quaternion_from_rpy, rotate_to_body
+from nmpc_control.rotations import quaternion_from_rpy
 from nmpc_control.state import (
     ATTITUDE,
     NU,
@@ -134,7 +134,7 @@ def odometry_to_msg(x: np.ndarray, header: Header, base_frame: str) -> Odometry:
     yaw_rate = x[YAW_RATE]
     message = Odometry(header=header, child_frame_id=base_frame)
     message.pose.pose = _pose(x)
-    message.twist.twist.linear = Vector3(*rotate_to_body(x[VELOCITY], *x[ATTITUDE]))
+    message.twist.twist.linear = Vector3(*_to_body(x[VELOCITY], *x[ATTITUDE]))
     message.twist.twist.angular = Vector3(
         -yaw_rate * math.sin(pitch),
         yaw_rate * math.sin(roll) * math.cos(pitch),
@@ -200,6 +200,15 @@ def _obstacle(message: ObstacleMsg, stamp: float) -> Obstacle:
 
 def _pose(x: np.ndarray) -> Pose:
     return Pose(Point(*x[POSITION]), Quaternion(*quaternion_from_rpy(*x[ATTITUDE])))
+
+
+def _to_body(
+    vector: Sequence[float], roll: float, pitch: float, yaw: float
+) -> Tuple[float, float, float]:
+    x, y, z = vector
+    x, y = math.cos(yaw) * x + math.sin(yaw) * y, math.cos(yaw) * y - math.sin(yaw) * x
+    x, z = math.cos(pitch) * x - math.sin(pitch) * z, math.cos(pitch) * z + math.sin(pitch) * x
+    return x, math.cos(roll) * y + math.sin(roll) * z, math.cos(roll) * z - math.sin(roll) * y
 
 
 def _require_frame(header: Header, frame_id: str) -> None:

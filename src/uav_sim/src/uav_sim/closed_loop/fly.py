@@ -15,6 +15,7 @@ import sys
 import time
 from pathlib import Path
 from typing import Dict, List, Optional
+from xmlrpc.client import ServerProxy
 
 from nmpc_control.errors import NmpcError
 from nmpc_control.scenario import Scenario, load_scenario, scenario_path
@@ -23,6 +24,7 @@ from uav_sim.errors import SimulatorError
 from uav_sim.preset import load_preset
 
 _DEFAULT_PORT = 11311
+_MASTER_TIMEOUT = 30.0  # [s] wall time for roslaunch to set the parameters
 _STOP_TIMEOUT = 20.0  # [s] wall time for roslaunch to end its nodes
 
 
@@ -122,8 +124,22 @@ def _fly(options: argparse.Namespace, scenario: Scenario, bag: Path) -> int:
             _say("interrupted")
             return 1
         finally:
-            _end(operator, signal.SIGINT)
+            if operator is not None:
+                _end(operator, signal.SIGINT)
             _end(nodes, signal.SIGINT)
+
+
+def _wait_for_simulated_time(nodes: "subprocess.Popen[bytes]", master_uri: str) -> None:
+    """Return when the master knows that time is simulated: a node that starts earlier would use wall time."""
+    master = ServerProxy(master_uri)
+    deadline = time.monotonic() + _MASTER_TIMEOUT
+    while nodes.poll() is None and time.monotonic() < deadline:
+        try:
+            if master.getParam("/fly", "/use_sim_time")[2] is True:
+                return
+        except OSError:
+            pass
+        time.sleep(0.05)
 
 
 def _judge(bag: Path, operator_status: int) -> int:

@@ -4,7 +4,9 @@
 import time
 from typing import Callable
 
-MAX_LAG = 0.2  # [s] of wall time that is caught up; what is lost beyond it stays lost
+# [s] of simulated time that is caught up in one burst; the rest stays lost, or subscribers would see a clock
+# that runs ahead of the telemetry still in their sockets
+MAX_LAG = 0.03
 
 
 class Pacer:
@@ -19,6 +21,7 @@ class Pacer:
     ) -> None:
         self.lost = 0.0  # [s] of wall time given up because the machine was too slow
         self._period = step / speed_factor if speed_factor > 0.0 else 0.0
+        self._max_lag = MAX_LAG / speed_factor if speed_factor > 0.0 else 0.0
         self._clock = clock
         self._sleep = sleep
         self._epoch = clock()
@@ -33,6 +36,6 @@ class Pacer:
         remaining = self._epoch + self._steps * self._period - self._clock()
         if remaining > 0.0:
             self._sleep(remaining)
-        elif remaining < -MAX_LAG:
+        elif remaining < -self._max_lag:
             self._epoch -= remaining
             self.lost -= remaining

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: MIT
+"""ROS node flight_guard: owns setpoint stream, authority, modes and ladder; needs no solver.
+
+ROS Subscribers: see ``guard_listener``.
+ROS Publishers:
+    dji_sdk/flight_control_setpoint_generic (sensor_msgs/Joy): 50 Hz while automatic flight is on.
+    nmpc/hold_request (std_msgs/Empty): tells the controller to drop its goal.
+    nmpc/status, /diagnostics: see ``guard_reports``.
+ROS Services: start, hover, land, release (std_srvs/Trigger), answered with a reason in words.
+ROS Parameters:
+    ~vehicle (str): file under config/vehicles.
+    ~avoidance (bool): false leaves obstacles out of the plan check.
+"""
+
+import queue
+import signal
+import sys
+import threading
+import time
+import traceback
+from typing import Callable, Optional
+
+import rospy
+from sensor_msgs.msg import Joy
+from std_msgs.msg import Empty, Header
+from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+
+from nmpc_control.errors import NmpcError
+from nmpc_control.guard import Guard
+from nmpc_control.guard_data import Action, GuardOutput
+from nmpc_control.guard_params import load_guard_parameters
+from nmpc_control.mode_inputs import Request
+from nmpc_control.params import load_parameters
+from nmpc_control.ros.dji_services import DjiServices
+from nmpc_control.ros.guard_listener import GuardListener
+from nmpc_control.ros.guard_reports import GuardReports
+
+ANSWER_TIMEOUT = 2.0  # [s] wall time in which a tick must answer a service call
+
+
+class _Question:
+    def __init__(self, request: Request) -> None:
+        self.request = request
+        self.answered = threading.Event()
+        self.answer = (False, "the guard did not answer")
+
+
+class GuardNode:
+    """One loop in the main thread ticks, publishes and waits for nobody."""
+
+    def __init__(self, guard: Guard, avoidance: bool) -> None:
+        self.guard = guard
+        self._listener = GuardListener(guard.params, avoidance)
+        self._reports = GuardReports(guard, self._listener.rejected_samples)
+        self._dji = DjiServices(self._listener.set_authority, self._listener.report_failure)
+        self._questions: "queue.Queue[_Question]" = queue.Queue(maxsize=10)
+        self._is_leaving = False
+        self._t = 0.0
+        self._setpoint = rospy.Publisher(
+            "dji_sdk/flight_control_setpoint_generic", Joy, queue_size=1, tcp_nodelay=True
+        )
+        self._hold = rospy.Publisher("nmpc/hold_request", Empty, queue_size=1)
+        for request in Request:
+            rospy.Service(request.value, Trigger, self._serve(request))
+        rospy.on_shutdown(self._leave)
+
+    def run(self) -> None:
+        """Tick until shutdown; a tick that fails is reported and answered with a brake."""
+        while rospy.Time.now().is_zero() and not rospy.is_shutdown():
+            time.sleep(0.01)  # of wall time: with /use_sim_time there is no other yet
+        rate = rospy.Rate(self.guard.params.rate)
+        while not (rospy.is_shutdown() or self._is_leaving):
+            try:
+                self._tick(rospy.Time.now())
+            except Exception:  # noqa: BLE001 (the stream must not end with one bad message)
+                rospy.logerr_throttle(1.0, f"tick failed: {traceback.format_exc(limit=-3)}")
+            try:
+                rate.sleep()
+            except rospy.ROSTimeMovedBackwardsException:
+                rospy.logwarn("the clock jumped backwards")
+            except rospy.ROSInterruptException:
+                break
+
+    def _tick(self, now: rospy.Time) -> None:
+        t = now.to_sec()
+        if t < self._t:
+            self._listener.start_anew()
+        self._t = t
+        question = self._next_question()
+        inputs = self._listener.take(t, question.request if question else None)
+        try:
+            output = self.guard.tick(inputs)
+        except Exception as error:  # noqa: BLE001 (whatever it is, the aircraft is in the air)
+            rospy.logerr_throttle(1.0, traceback.format_exc(limit=-3))
+            output = self.guard.give_way(t, inputs.telemetry, error)
+        if output.axes is not None and not self._is_leaving:
+            self._setpoint.publish(Joy(header=Header(stamp=now), axes=output.axes))
+        self._act(output)
+        if question:
+            question.answer = output.answer or (False, output.reason)
+            question.answered.set()
+            rospy.loginfo(f"{question.request.value}: {question.answer[1]}")
+        obstacle_age = self._listener.obstacle_age(t)
+        self._reports.publish(now, inputs, output, self._listener.last_plan, obstacle_age)
+
+    def _act(self, output: GuardOutput) -> None:
+        if Action.RELEASE_AUTHORITY in output.actions:
+            self._listener.set_authority(False)
+        if Action.HOLD in output.actions:
+            self._hold.publish(Empty())
+        self._dji.order(output.actions)
+
+    def _leave(self) -> None:
+        """Give authority back while ROS still lives: silence alone is not relied upon."""
+        self._is_leaving = True
+        if self._listener.authority:
+            _, sentence = self._dji.release_now()
+            rospy.logwarn(f"shutting down: {sentence}")
+
+    def _serve(self, request: Request) -> Callable[[TriggerRequest], TriggerResponse]:
+        def handle(_: TriggerRequest) -> TriggerResponse:
+            question = _Question(request)
+            try:
+                self._questions.put_nowait(question)
+            except queue.Full:
+                return TriggerResponse(False, "too many requests at once")
+            question.answered.wait(ANSWER_TIMEOUT)
+            return TriggerResponse(*question.answer)
+
+        return handle
+
+    def _next_question(self) -> Optional[_Question]:
+        try:
+            return self._questions.get_nowait()
+        except queue.Empty:
+            return None
+
+
+def main() -> None:
+    """Entry point of the node: exit status 2 on bad parameters, 1 where it must not fly."""
+    rospy.init_node("flight_guard", disable_signals=True)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        guard = _guard()
+        GuardNode(guard, bool(rospy.get_param("~avoidance", True))).run()
+    except NmpcError as error:
+        sys.exit(_refuse(str(error), 2))
+    except KeyboardInterrupt:
+        pass  # rospy's own handler would end ROS before authority is given back
+    finally:
+        rospy.signal_shutdown("flight_guard ends")
+
+
+def _guard() -> Guard:
+    params = load_guard_parameters()
+    parameters = load_parameters(rospy.get_param("~vehicle", "dji_hil"))
+    vehicle = parameters.vehicle
+    if params.vertical_command == "thrust" and not vehicle.thrust_map.measured_on:
+        where = f"vehicles/{vehicle.name}.yaml: thrust_map.measured_on is empty"
+        sys.exit(_refuse(f"{where}: thrust is not commanded through an unmeasured map", 1))
+    return Guard(params, vehicle, parameters.limits)
+
+
+def _refuse(sentence: str, status: int) -> int:
+    rospy.logfatal(sentence)
+    return status

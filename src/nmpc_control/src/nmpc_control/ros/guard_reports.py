@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""What the guard tells people and tools: ControllerStatus every tick, diagnostics once a second.
+
+ROS Publishers: nmpc/status (nmpc_msgs/ControllerStatus), /diagnostics.
+"""
+
+import math
+from typing import Callable, Optional, Tuple
+
+import diagnostic_updater
+import rospy
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from nmpc_control.guard import Guard
+from nmpc_control.guard_data import GuardInputs, GuardOutput
+from nmpc_control.ladder import Rung
+from nmpc_control.mode_inputs import PLANNED, Mode
+from nmpc_control.state import Goal
+from nmpc_msgs.msg import ControlInput, ControllerStatus, Plan
+
+Wrapper = diagnostic_updater.DiagnosticStatusWrapper
+_ATTENTION = (Mode.BRAKING, Mode.RELEASED, Mode.FAULT)
+_SILENT = ControlInput(math.nan, math.nan, math.nan, math.nan)
+
+
+class GuardReports:
+    """Publishes every tick's outcome and keeps the last one for the diagnostics."""
+
+    def __init__(self, guard: Guard, rejected_samples: Callable[[], str]) -> None:
+        self._guard = guard
+        self._rejected_samples = rejected_samples
+        self._last: Optional[Tuple[GuardInputs, GuardOutput]] = None
+        self._status = rospy.Publisher(
+            "nmpc/status", ControllerStatus, queue_size=10, tcp_nodelay=True
+        )
+        self._updater = diagnostic_updater.Updater()
+        self._updater.setHardwareID("M100")
+        self._updater.add("flight", self._diagnose_flight)
+        self._updater.add("telemetry", self._diagnose_telemetry)
+        self._updater.add("plans", self._diagnose_plans)
+
+    def publish(
+        self,
+        now: rospy.Time,
+        inputs: GuardInputs,
+        output: GuardOutput,
+        last_plan: Plan,
+        obstacle_age: float,
+    ) -> None:
+        """Publish one tick; ``last_plan`` is the newest plan message, an empty one without."""
+        guard, telemetry = self._guard, inputs.telemetry
+        ages = (telemetry.position_age, telemetry.velocity_age, telemetry.attitude_age)
+        message = ControllerStatus(
+            mode=int(output.mode),
+            rung=int(output.rung),
+            reason=output.reason,
+            authority=telemetry.authority,
+            setpoint_sent=output.axes is not None,
+            applied=_SILENT if output.applied is None else ControlInput(*output.applied),
+            goal=int(guard.ladder.goal if output.mode in PLANNED else Goal.HOLD),
+            reference_time=last_plan.reference_time if output.mode in PLANNED else math.nan,
+            plan_age=guard.ladder.age(inputs.t),
+            state_age=max(ages),
+            obstacle_age=obstacle_age,
+            plans_received=guard.ladder.received,
+            plans_rejected=guard.ladder.rejected,
+            solver_status=last_plan.solver_status,
+            iterations=last_plan.iterations,
+            solve_time=last_plan.solve_time,
+            deadline_misses=last_plan.deadline_misses,
+            predicted_clearance=output.clearance,
+            battery=telemetry.battery,
+        )
+        message.header.stamp = now
+        self._status.publish(message)
+        self._last = (inputs, output)
+        self._updater.update()
+
+    def _diagnose_flight(self, status: Wrapper) -> Wrapper:
+        if self._last is None:
+            status.summary(DiagnosticStatus.WARN, "not started")
+            return status
+        inputs, output = self._last
+        level = DiagnosticStatus.WARN if output.mode in _ATTENTION else DiagnosticStatus.OK
+        level = DiagnosticStatus.ERROR if output.mode is Mode.FAULT else level
+        status.summary(level, f"{output.mode.name.lower().replace('_', ' ')}: {output.reason}")
+        status.add("rung", Rung(output.rung).name.lower().replace("_", " "))
+        status.add("authority", str(inputs.telemetry.authority))
+        return status
+
+    def _diagnose_telemetry(self, status: Wrapper) -> Wrapper:
+        if self._last is None:
+            status.summary(DiagnosticStatus.WARN, "nothing received")
+            return status
+        telemetry = self._last[0].telemetry
+        timeouts = self._guard.params.modes
+        ages = {
+            "attitude": (telemetry.attitude_age, timeouts.attitude_timeout),
+            "velocity": (telemetry.velocity_age, timeouts.velocity_timeout),
+            "position": (telemetry.position_age, timeouts.position_timeout),
+            "rc": (telemetry.rc_age, timeouts.rc_timeout),
+            "flight status": (telemetry.status_age, timeouts.status_timeout),
+            "battery": (telemetry.battery_age, timeouts.battery_timeout),
+        }
+        stale = [name for name, (age, timeout) in ages.items() if age > timeout]
+        level = DiagnosticStatus.WARN if stale else DiagnosticStatus.OK
+        status.summary(level, f"stale: {', '.join(stale)}" if stale else "all fresh")
+        for name, (age, _) in ages.items():
+            status.add(f"{name} age [s]", f"{age:.3f}")
+        status.add("RC mode", telemetry.rc.value)
+        status.add("GPS health", str(telemetry.gps_health))
+        status.add("battery [%]", f"{100.0 * telemetry.battery:.0f}")
+        status.add("samples refused", self._rejected_samples())
+        return status
+
+    def _diagnose_plans(self, status: Wrapper) -> Wrapper:
+        ladder = self._guard.ladder
+        age = math.inf if self._last is None else ladder.age(self._last[0].t)
+        is_fresh = age <= self._guard.params.plan_check.timeout
+        level = DiagnosticStatus.OK if is_fresh else DiagnosticStatus.WARN
+        status.summary(level, f"last verified plan {age:.2f} s ago")
+        status.add("received", str(ladder.received))
+        status.add("rejected", str(ladder.rejected))
+        return status

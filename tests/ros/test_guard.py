@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+import pytest
+
+pytestmark = pytest.mark.ros
+
+BRAKE, VELOCITY = 3, 73.0
+
+
+@pytest.fixture
+def flight(ros):
+    """Simulator, controller and guard; the guard ends only when a test ends it."""
+    ros.launch("uav_sim", "simulator.launch")
+    ros.wait_for_node("/uav_sim")
+    for name in ("flight_guard", "nmpc_controller"):
+        ros.start("rosrun", "nmpc_control", name)
+        ros.wait_for_node(f"/{name}")
+    return ros
+
+
+def test_a_dead_controller_leaves_a_held_aircraft_that_still_lands(flight):
+    seen = flight.run_json("guard_client.py", "controller_dies", timeout=120)
+    assert seen["start"] == [True, "taking off"]
+    assert seen["second_start"] == [False, "automatic flight is under way: hovering"]
+    assert 0.3 < seen["takeover"] < 0.7  # the last verified plan is flown for 0.5 s
+    assert seen["status"][0] == BRAKE
+    assert seen["status"][1].startswith("the plan is 0.5")
+    assert seen["flag"] == VELOCITY
+    assert seen["drift"] < 0.3
+    assert seen["gap"] <= 0.04
+    assert seen["land"] == [True, "landing"]
+    assert seen["height"] < 0.05
+    assert seen["modes"][-5:] == ["TAKING_OFF", "HOVERING", "BRAKING", "LANDING", "WAITING"]
+    assert seen["authority"] is False
+    granted, words = seen["start_without_plans"]
+    assert not granted
+    assert "0 of 10 plans verified in a row (the plan is" in words
+    assert "Traceback" not in flight.output()
+
+
+def test_the_pilot_silences_the_stream_and_only_a_new_start_resumes(flight):
+    seen = flight.run_json("guard_client.py", "pilot_takes_over", timeout=120)
+    assert seen["task"] == 1, "authority was not given back"
+    assert seen["last_setpoint_after"] < 0.0
+    assert seen["start"] == [True, "braking to hover"]
+    assert seen["modes"][-6:] == ["HOVERING", "MANUAL", "WAITING", "READY", "BRAKING", "HOVERING"]
+
+
+def test_ctrl_c_in_the_air_gives_authority_back(flight):
+    seen = flight.run_json("guard_client.py", "guard_is_interrupted", timeout=120)
+    assert seen == {"task": 1, "silent": True}
+    log = flight.output()
+    assert "shutting down: release authority: done" in log
+    assert "Traceback" not in log
+
+
+def test_an_unknown_vehicle_ends_in_one_line(ros):
+    guard = ros.start("rosrun", "nmpc_control", "flight_guard", "_vehicle:=m600")
+    assert guard.wait(30) == 2
+    log = ros.output()
+    assert "m600.yaml: file: got 'No such file or directory', expected a readable file" in log
+    assert "Traceback" not in log
