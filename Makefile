@@ -27,7 +27,6 @@ fly: build
 	@$(in_workspace) rosrun uav_sim fly "$$SCENARIO" --plant "$$PLANT" --speed "$$SPEED" $(if $(filter-out 0,$(RVIZ)),--rviz)
 
 test: lint
-	@.setup/system.sh test.txt
 	@$(single_thread) .setup/python38.sh
 	@$(in_workspace) $(single_thread) .venv/bin/python3 -m pytest tests $(PYTEST_ARGS)
 

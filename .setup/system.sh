@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Install the missing system packages: system.sh [LIST...]; touches no network if none is missing.
+# Install the system packages that are missing; touches no network if none is.
 . "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 lock
 
@@ -14,7 +14,7 @@ else
 fi
 
 missing=()
-for package in $(sed 's/#.*//' ".setup/packages-$platform.txt" "${@/#/.setup/packages-}"); do
+for package in $(sed 's/#.*//' ".setup/packages-$platform.txt"); do
   status="$(dpkg-query --show --showformat='${db:Status-Status}' "$package" 2>/dev/null || true)"
   [ "$status" = installed ] || missing+=("$package")
 done

@@ -15,6 +15,7 @@ from xmlrpc.client import ServerProxy
 import rospy
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Joy
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from dji_sdk.srv import DroneTaskControl
@@ -108,14 +109,13 @@ def controller_dies():
 
 
 def pilot_takes_over():
-    """Hover, see the switch leave F once, and find the stream silent from then on."""
+    """Hover, see the switch leave F for a moment; the stream is silent until a new start."""
     client = Client()
     client.hover()
-    client.rc.publish(Joy(axes=[0, 0, 0, 0, -8000.0, -10000.0]))
-    rospy.sleep(0.2)
-    header = rospy.Header(stamp=rospy.Time.now())
-    client.rc.publish(Joy(header=header, axes=[0, 0, 0, 0, -8000.0, -10000.0]))
-    client.wait("MANUAL", 2.0)
+    while MODES[client.statuses[-1].mode] != "MANUAL":  # against the simulator's own F
+        header = Header(stamp=rospy.Time.now())
+        client.rc.publish(Joy(header=header, axes=[0, 0, 0, 0, -8000.0, -10000.0]))
+        rospy.sleep(0.005)
     manual = client.statuses[-1].header.stamp.to_sec()
     rospy.sleep(1.0)
     seen = {"modes": client.modes(), "task": client.land_task_ack()}

@@ -270,6 +270,16 @@ def test_a_full_path_is_thinned_evenly_and_keeps_both_ends() -> None:
     assert len(set(np.diff(times))) == 1
 
 
+def test_labels_of_a_path_that_is_joined_late_stand_where_they_belong() -> None:
+    path = FlownPath(labels=4)
+    path.start_clock(100.0)
+    for t in np.arange(112.0, 147.0, 0.05):
+        path.add(t, np.array([t - 100.0, 0.0, 0.0]))
+    assert [t for t, _ in path.labels] == [20.0, 30.0, 40.0]
+    for t, place in path.labels:
+        assert place[0] == pytest.approx(t, abs=0.051)
+
+
 @pytest.mark.ros
 def test_the_node_draws_a_flight_for_a_viewer_that_comes_late(ros: Any) -> None:
     ros.launch("nmpc_control", "monitor.launch", rviz=False)

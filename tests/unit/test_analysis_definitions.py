@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Message definitions of a bag: what passes is plain fields, what is hostile is refused."""
 
+import re
+
 import pytest
 from analysis_bags import FIELDS, STORE, Flight
 
@@ -15,8 +17,10 @@ def test_decodes_like_the_library(msgtype):
     definition, _ = STORE.generate_msgdef(msgtype)
     decoded = decoder(msgtype, definition)(SAMPLES[msgtype])
     expected = STORE.deserialize_ros1(SAMPLES[msgtype], msgtype)
+    constant = re.compile(r", [A-Z_]+=\d+")  # in the library's texts only
     for name, _ in FIELDS[msgtype][1]:
-        assert repr(getattr(decoded, name)) == repr(getattr(expected, name))
+        text = constant.sub("", repr(getattr(expected, name)))
+        assert repr(getattr(decoded, name)) == text
 
 
 def test_constants_comments_and_space_are_left_out():

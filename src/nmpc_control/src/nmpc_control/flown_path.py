@@ -5,11 +5,13 @@ from typing import List, Optional, Tuple
 
 import numpy as np
 
+_LATEST = 0.5  # [s] after which a position no longer shows where the aircraft was at a full period
+
 
 class FlownPath:
     """Positions at least a spacing apart, and those at every few seconds of a clock.
 
-    When either is full, every second entry goes and the spacing or the period doubles.
+    When either is full, every second entry goes, and the spacing or the period doubles.
     """
 
     def __init__(
@@ -38,16 +40,21 @@ class FlownPath:
             self._points.append(position)
             if len(self._points) > self._capacity:
                 self._points, self._spacing = self._points[::2], 2 * self._spacing
-        if self._clock_start is None:
-            return
-        due = self.labels[-1][0] + self._period if self.labels else 0.0
-        if t - self._clock_start >= due:
-            self.labels.append((due, position))
-            if len(self.labels) > self._label_capacity:
-                self.labels, self._period = self.labels[::2], 2 * self._period
+        if self._clock_start is not None and t >= self._clock_start:
+            self._label(t - self._clock_start, position)
 
     @property
     def points(self) -> np.ndarray:
         """Positions (n, 3) [m], the newest last."""
         newest = [] if self._last is None else [self._last]
         return np.array(self._points + newest).reshape(-1, 3)
+
+    def _label(self, elapsed: float, position: np.ndarray) -> None:
+        due = elapsed // self._period * self._period
+        is_new = not self.labels or due > self.labels[-1][0]
+        if not is_new or elapsed - due > _LATEST:
+            return
+        self.labels.append((due, position))
+        if len(self.labels) > self._label_capacity:
+            self._period *= 2
+            self.labels = [label for label in self.labels if label[0] % self._period == 0.0]

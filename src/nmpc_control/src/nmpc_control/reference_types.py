@@ -159,7 +159,7 @@ class Waypoints:
     method: str = field(
         default="interpolate", metadata={"choices": ("interpolate", "approximate", "fit")}
     )
-    degree: Optional[int] = field(default=None, metadata={"min": 1, "max": 9})  # 3, or what the points allow
+    degree: Optional[int] = field(default=None, metadata={"min": 1, "max": 9})  # 3 if points allow
     knots: Any = "uniform"
     ends: Optional[str] = None  # interpolate: not_a_knot (default) or natural
     closed: bool = False
@@ -170,7 +170,8 @@ class Waypoints:
         """Return the trajectory."""
         _refuse_yaw_list(yaw, self.closed)
         points = _points(self.points)
-        degree = self.degree or (3 if self.ends == "natural" else min(3, max(1, len(points) - 1)))
+        n = self.control_points or len(points)
+        degree = self.degree or (3 if self.ends == "natural" else min(3, n - 1))
         options: Dict[str, Any] = {"degree": degree, "knots": self.knots}
         if self.ends is not None:
             options["ends"] = self._only("interpolate", "ends")

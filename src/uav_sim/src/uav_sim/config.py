@@ -3,6 +3,7 @@
 
 import dataclasses
 import math
+import re
 from pathlib import Path
 from typing import Any, Dict, Optional, Tuple, Type, TypeVar, Union, get_type_hints
 
@@ -24,6 +25,15 @@ def config_directory() -> Path:
     raise ConfigError(str(candidates[0]), "folder", None, "the package's configuration folder")
 
 
+class _NumberLoader(yaml.SafeLoader):
+    """Safe loader that reads 1e-3 as a number."""
+
+
+_NumberLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"^[-+]?\d+(\.\d*)?[eE][-+]?\d+$"), list("-+0123456789")
+)
+
+
 def load_yaml(path: Source) -> Dict[str, Any]:
     """Return the mapping in a YAML file.
 
@@ -31,7 +41,8 @@ def load_yaml(path: Source) -> Dict[str, Any]:
         ConfigError: the file cannot be read, is no YAML, or holds no mapping.
     """
     try:
-        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        text = Path(path).read_text(encoding="utf-8")
+        data = yaml.load(text, Loader=_NumberLoader)
     except OSError as error:
         raise ConfigError(str(path), "file", error.strerror, "a readable file") from None
     except UnicodeDecodeError:

@@ -48,7 +48,7 @@ class Scene:
         else:
             self._path.clear()
             self._true_path.clear()
-        points = _rows([point.transforms[0].translation for point in message.points])
+        points = _rows([p.transforms[0].translation for p in message.points if p.transforms])
         stride = 1 + len(points) // MOST_REFERENCE_POINTS
         shown = np.vstack([points[::stride], points[-1:]])
         self._set("reference", self._line, "reference (green)", shown, markers.GREEN, 0.05)

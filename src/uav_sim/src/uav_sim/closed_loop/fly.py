@@ -75,13 +75,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--bags", type=Path, default=Path("bags"), help="folder for bag, JSON and report"
     )
+    parser.add_argument("--port", type=int, default=0, help="of the ROS master (default: 11311 if free, else any)")
     parser.add_argument("--rviz", action="store_true", help="open RViz")
     return parser
 
 
 def _fly(options: argparse.Namespace, scenario: Scenario, bag: Path) -> int:
     """Run the flight; returns the operator's exit status."""
-    environment = _environment()
+    environment = _environment(options.port or _free_port())
     path = scenario_path(options.scenario).resolve()
     launch = [
         "roslaunch",
@@ -171,11 +172,11 @@ def _judge(bag: Path, operator_status: int) -> int:
     return 0 if good else 1
 
 
-def _environment() -> Dict[str, str]:
+def _environment(port: int) -> Dict[str, str]:
     """Return an environment with a master of our own, reachable from this machine only."""
     return {
         **os.environ,
-        "ROS_MASTER_URI": f"http://localhost:{_free_port()}",
+        "ROS_MASTER_URI": f"http://localhost:{port}",
         "ROS_HOSTNAME": "localhost",
         "ROS_IP": "127.0.0.1",
         "PYTHONUNBUFFERED": "1",
