@@ -7,9 +7,12 @@ from typing import Any, Dict, Optional
 import casadi as ca
 import numpy as np
 
-from nmpc_control.ocp import THETA_SIZE, Instance, Structure, Symbols, next_state, stage_cost
-from nmpc_control.solution import Guess, Solution, cold_guess
+from nmpc_control import constraints
+from nmpc_control.ocp import PARTS, THETA_SIZE, Instance, Structure, Symbols, inequalities, next_state, stage_cost
+from nmpc_control.solution import Guess, Solution, cold_guess, worst_violation
 from nmpc_control.state import NU, NX
+
+_EXCESS = 1e-3  # [m], [m/s], [1] above which a softened bound counts as exceeded
 
 
 class IpoptSolver:
@@ -24,6 +27,7 @@ class IpoptSolver:
         options: Optional[Dict[str, Any]] = None,
     ) -> None:
         self.structure = structure
+        self._kinds = constraints.rows(structure.obstacle_slots)
         ipopt = {
             "print_level": 0,
             "sb": "yes",
@@ -41,20 +45,30 @@ class IpoptSolver:
         start = time.perf_counter()
         N = self.structure.horizon
         guess = guess or cold_guess(instance.x0, N)
-        lower, upper = np.full(N * (NX + NU) + NX, -np.inf), np.full(N * (NX + NU) + NX, np.inf)
-        free_states = N * NX + NX
+        free_states, slacks = N * NX + NX, N * (NX + NU) + NX
+        count = self.structure.inequalities * (N + 1) - 2 * NU  # the last stage has no input rate
+        lower, upper = np.full(slacks + count, -np.inf), np.full(slacks + count, np.inf)
         lower[:NX] = upper[:NX] = instance.x0
-        lower[free_states:], upper[free_states:] = np.tile(instance.input_min, N), np.tile(instance.input_max, N)
+        lower[free_states:slacks], upper[free_states:slacks] = np.tile(instance.input_min, N), np.tile(instance.input_max, N)
+        lower[slacks:] = 0.0
         parameters = np.concatenate([instance.u_before, instance.theta, instance.stages.ravel(order="F")])
         result = self._solver(
-            x0=np.concatenate([guess.states.ravel(), guess.inputs.ravel()]),
-            lbx=lower, ubx=upper, lbg=0.0, ubg=0.0, p=parameters,
+            x0=np.concatenate([guess.states.ravel(), guess.inputs.ravel(), np.zeros(count)]),
+            lbx=lower,
+            ubx=upper,
+            lbg=np.concatenate([np.zeros(N * NX), np.full(count, -np.inf)]),
+            ubg=0.0,
+            p=parameters,
         )
         stats = self._solver.stats()
         z = np.asarray(result["x"]).ravel()
-        inputs = z[free_states:].reshape(N, NU)
-        multipliers = np.asarray(result["lam_x"]).ravel()[free_states:]
-        defect = float(np.max(np.abs(np.asarray(result["g"]))))
+        inputs = z[free_states:slacks].reshape(N, NU)
+        multipliers = np.asarray(result["lam_x"]).ravel()[free_states:slacks]
+        g = np.asarray(result["g"]).ravel()
+        defect = float(np.max(np.abs(g[: N * NX])))
+        excess = np.zeros((N + 1, self.structure.inequalities))
+        excess.ravel()[:count] = z[slacks:]
+        violation, softened = worst_violation(excess, self._kinds, _EXCESS)
         status = str(stats["return_status"])
         return Solution(
             found=bool(np.all(np.isfinite(z)) and defect < 1e-3),
@@ -66,6 +80,8 @@ class IpoptSolver:
             kkt_residual=max(defect, float(stats["iterations"]["inf_du"][-1]) if stats["iter_count"] >= 0 else np.inf),
             active_bounds=int(np.sum(np.abs(multipliers) > 1e-4)),
             solve_time=time.perf_counter() - start,
+            violation=violation,
+            softened=softened,
         )
 
 
@@ -75,17 +91,23 @@ def _transcribe(structure: Structure) -> Dict[str, ca.SX]:
     step = ca.Function("step", [s.x, s.u, s.theta], [next_state(structure, s)])
     inner = ca.Function("l", [s.x, s.u, s.u_before, s.stage, s.theta], [stage_cost(structure, s, False)])
     last = ca.Function("l_N", [s.x, s.stage, s.theta], [stage_cost(structure, s, True)])
+    bounds = ca.Function("g", [s.x, s.u, s.u_before, s.stage, s.theta], [inequalities(structure, s, False)])
+    last_bounds = ca.Function("g_N", [s.x, s.stage, s.theta], [inequalities(structure, s, True)])
     X, U = ca.SX.sym("X", NX, N + 1), ca.SX.sym("U", NU, N)
     u_before, theta = ca.SX.sym("u_before", NU), ca.SX.sym("theta", THETA_SIZE)
     stages = ca.SX.sym("stages", structure.stage_size, N + 1)
-    cost, defects = last(X[:, N], stages[:, N], theta), []
+    slack = ca.SX.sym("slack", structure.inequalities * (N + 1) - 2 * NU)
+    soft_weight = theta[PARTS["soft_weight"]]
+    cost, defects, g = last(X[:, N], stages[:, N], theta) + soft_weight * ca.sum1(slack), [], []
     for k in range(N):
         before = U[:, k - 1] if k else u_before
         cost += inner(X[:, k], U[:, k], before, stages[:, k], theta)
         defects.append(X[:, k + 1] - step(X[:, k], U[:, k], theta))
+        g.append(bounds(X[:, k], U[:, k], before, stages[:, k], theta))
+    g.append(last_bounds(X[:, N], stages[:, N], theta))
     return {
-        "x": ca.vertcat(ca.vec(X), ca.vec(U)),
+        "x": ca.vertcat(ca.vec(X), ca.vec(U), slack),
         "f": cost,
-        "g": ca.vertcat(*defects),
+        "g": ca.vertcat(*defects, ca.vertcat(*g) - slack),
         "p": ca.vertcat(u_before, theta, ca.vec(stages)),
     }

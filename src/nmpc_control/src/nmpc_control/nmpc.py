@@ -99,7 +99,7 @@ class Nmpc:
         stages = (t - self._last_t) / self.structure.dt
         if not 0.0 <= stages < self.structure.horizon / 2:
             return None
-        return shift(Guess(self._last.states, self._last.inputs, self._last.gains), stages)
+        return shift(self._last.guess, stages)
 
     def _slots(self, t: float, obstacles: Sequence[Obstacle], path: np.ndarray) -> List[np.ndarray]:
         """Return slot data (N + 1, 5) of the obstacles that come nearest to the path (N + 1, 3)."""

@@ -6,6 +6,7 @@
     subject to x_0 given, u_{-1} the input really applied before, x_{k+1} = F(x_k, u_k), u_min <= u_k <= u_max
 
     U_i(x) = eta / 2 (1 / d_i - 1 / D_i)^2  where d_i < D_i, else 0            (Eq. 8)
+    softened: |v| <= v_max, p_min <= p <= p_max, |u_k - u_{k-1}| <= dt u'_max, and d_i >= D_i (Eq. 7) if selected
 
 d_i is the distance to the centre of obstacle i and D_i its radius plus hull plus safety distance. Everything
 but N, dt, the integrator and the number of obstacle slots is a run-time parameter.
@@ -17,13 +18,32 @@ from typing import Sequence, Tuple
 import casadi as ca
 import numpy as np
 
+from nmpc_control import constraints
 from nmpc_control.errors import ProblemError
 from nmpc_control.model import INTEGRATORS, MODEL_SIZE, discrete, model_parameters
 from nmpc_control.params import Avoidance, Limits, Vehicle, Weights
 from nmpc_control.state import NU, NX, YAW
 
 SLOT_SIZE = 5  # centre x, y, z [m]; weight of the vertical distance [1]; 1 / D [1/m]
-THETA_SIZE = MODEL_SIZE + 2 * NX + 4 * NU + 1
+_SIZES = {
+    "model": MODEL_SIZE,
+    "Q": NX,
+    "Q_f": NX,
+    "R": NU,
+    "R_delta": NU,
+    "u_min": NU,
+    "u_max": NU,
+    "eta": 1,
+    "speed": 1,  # [m/s]
+    "fence_min": 3,  # [m]
+    "fence_max": 3,  # [m]
+    "input_rate": NU,  # [input unit per s]
+    "soft_weight": 1,  # rho of the L1 penalty
+    "hard_obstacles": 1,  # 1: Eq. 7 holds as an inequality; 0: it does not
+}
+_ENDS = np.cumsum(list(_SIZES.values()))
+PARTS = {name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS)}
+THETA_SIZE = int(_ENDS[-1])
 EMPTY_SLOT = (0.0, 0.0, 0.0, 1.0, 1e6)  # D of a micrometre: never in reach
 
 
@@ -41,6 +61,11 @@ class Structure:
             raise ProblemError(f"structure: got {self}, expected N >= 1, dt > 0, slots >= 0 and a known integrator")
 
     @property
+    def inequalities(self) -> int:
+        """Number of softened inequalities of one stage."""
+        return len(constraints.rows(self.obstacle_slots))
+
+    @property
     def stage_size(self) -> int:
         """Length of one column of stage data: reference state and input, obstacle slots."""
         return NX + NU + SLOT_SIZE * self.obstacle_slots
@@ -53,24 +78,29 @@ class Instance:
     x0: np.ndarray  # (10,) state at stage 0
     u_before: np.ndarray  # (4,) input really applied before stage 0
     stages: np.ndarray  # (stage_size, N + 1) reference state, reference input, obstacle slots
-    theta: np.ndarray  # (THETA_SIZE,) model, weights, bounds, eta
+    theta: np.ndarray  # (THETA_SIZE,) see PARTS
 
     @property
     def input_min(self) -> np.ndarray:
         """Lower input bounds (4,)."""
-        return self.theta[-1 - 2 * NU : -1 - NU]
+        return self.theta[PARTS["u_min"]]
 
     @property
     def input_max(self) -> np.ndarray:
         """Upper input bounds (4,)."""
-        return self.theta[-1 - NU : -1]
+        return self.theta[PARTS["u_max"]]
+
+    @property
+    def soft_weight(self) -> float:
+        """Weight rho of the L1 penalty on the softened inequalities."""
+        return float(self.theta[PARTS["soft_weight"]][0])
 
 
 def pack_theta(
     vehicle: Vehicle, weights: Weights, limits: Limits, avoidance: Avoidance, disturbance: np.ndarray
 ) -> np.ndarray:
     """Return the parameter vector (THETA_SIZE,) shared by all stages; raises ProblemError on unusable numbers."""
-    eta = avoidance.eta if avoidance.enabled else 0.0
+    potential, hard = avoidance.enabled and avoidance.term == "potential", avoidance.enabled and avoidance.term == "hard"
     theta = np.concatenate(
         [
             model_parameters(vehicle, disturbance),
@@ -80,15 +110,23 @@ def pack_theta(
             weights.R_delta,
             limits.input_min,
             limits.input_max,
-            [eta],
+            [avoidance.eta if potential else 0.0, limits.speed],
+            limits.fence_min,
+            limits.fence_max,
+            limits.input_rate,
+            [limits.soft_weight, float(hard)],
         ]
     )
     if not np.all(np.isfinite(theta)):
         raise ProblemError("parameters: got a value that is not finite")
-    if np.any(theta[MODEL_SIZE : MODEL_SIZE + 2 * NX + 2 * NU] < 0) or eta < 0:
-        raise ProblemError("weights: got a negative value, expected none")
-    if np.any(limits.input_min > limits.input_max):
-        raise ProblemError(f"limits: got input_min {limits.input_min} above input_max {limits.input_max}")
+    for name in ("Q", "Q_f", "R", "R_delta", "eta", "soft_weight", "input_rate"):
+        if np.any(theta[PARTS[name]] < 0):
+            raise ProblemError(f"{name}: got {theta[PARTS[name]]}, expected no negative value")
+    for low, high in (("u_min", "u_max"), ("fence_min", "fence_max")):
+        if np.any(theta[PARTS[low]] >= theta[PARTS[high]]):
+            raise ProblemError(f"{low}: got {theta[PARTS[low]]}, expected less than {high} {theta[PARTS[high]]}")
+    if not limits.speed > 0:
+        raise ProblemError(f"speed: got {limits.speed}, expected more than 0")
     return theta
 
 
@@ -133,9 +171,11 @@ class Symbols:
         self.u_before = ca.SX.sym("u_before", NU)
         self.stage = ca.SX.sym("stage", structure.stage_size)
         self.theta = ca.SX.sym("theta", THETA_SIZE)
-        sizes = np.cumsum([0, MODEL_SIZE, NX, NX, NU, NU, NU, NU, 1])
-        parts = [self.theta[a:b] for a, b in zip(sizes[:-1], sizes[1:])]
-        self.model, self.Q, self.Q_f, self.R, self.R_delta, self.u_min, self.u_max, self.eta = parts
+        self.multipliers = ca.SX.sym("multipliers", structure.inequalities)
+        parts = {name: self.theta[part] for name, part in PARTS.items()}
+        self.model, self.Q, self.Q_f = parts["model"], parts["Q"], parts["Q_f"]
+        self.R, self.R_delta, self.eta = parts["R"], parts["R_delta"], parts["eta"]
+        self.u_min, self.u_max, self.bounds = parts["u_min"], parts["u_max"], parts
 
 
 def next_state(structure: Structure, s: Symbols) -> ca.SX:
@@ -157,8 +197,26 @@ def residuals(structure: Structure, s: Symbols, terminal: bool) -> Tuple[ca.SX, 
     )
 
 
+def inequalities(structure: Structure, s: Symbols, terminal: bool) -> ca.SX:
+    """Return g, to be <= 0, of one stage; the rows of the input rate are missing at the terminal one."""
+    distances = [(_distance(s.x[:3], slot), 1 / slot[4]) for slot in _slots(structure, s.stage)]
+    g = constraints.state_inequalities(s.x[:3], s.x[6:9], s.bounds, distances)
+    if terminal:
+        return g
+    step = structure.dt * s.bounds["input_rate"]
+    return ca.vertcat(g, constraints.rate_inequalities(s.u, s.u_before, step, s.u_max - s.u_min))
+
+
+def augmented_residuals(structure: Structure, s: Symbols, terminal: bool) -> Tuple[ca.SX, ca.SX]:
+    """Return residuals and weights of the stage cost with the augmented Lagrangian of the inequalities."""
+    r, w = residuals(structure, s, terminal)
+    g = inequalities(structure, s, terminal)
+    mu = ca.DM(constraints.curvature(structure.obstacle_slots)[: g.shape[0]])
+    return ca.vertcat(r, ca.fmax(0, g + s.multipliers[: g.shape[0]] / mu)), ca.vertcat(w, mu / 2)
+
+
 def stage_cost(structure: Structure, s: Symbols, terminal: bool) -> ca.SX:
-    """Return the cost of one stage (Eq. 5 with Eqs. 8, 9)."""
+    """Return the cost of one stage (Eq. 5 with Eqs. 8, 9), without the penalty on the inequalities."""
     r, w = residuals(structure, s, terminal)
     return ca.dot(w, r * r)
 
@@ -168,8 +226,11 @@ def _slots(structure: Structure, stage: ca.SX) -> Sequence[ca.SX]:
     return [stage[first + SLOT_SIZE * i : first + SLOT_SIZE * (i + 1)] for i in range(structure.obstacle_slots)]
 
 
-def _potential_root(position: ca.SX, slot: ca.SX) -> ca.SX:
+def _distance(position: ca.SX, slot: ca.SX) -> ca.SX:
     offset = position - slot[:3]
     # the small constant keeps the derivative finite at the very centre of an obstacle
-    d = ca.sqrt(offset[0] ** 2 + offset[1] ** 2 + slot[3] * offset[2] ** 2 + 1e-6)
-    return ca.fmax(0, 1 / d - slot[4])
+    return ca.sqrt(offset[0] ** 2 + offset[1] ** 2 + slot[3] * offset[2] ** 2 + 1e-6)
+
+
+def _potential_root(position: ca.SX, slot: ca.SX) -> ca.SX:
+    return ca.fmax(0, 1 / _distance(position, slot) - slot[4])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Parameters of vehicle, problem, solver and controller; values live in ``config/*.yaml``, here is what they mean."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Optional
 
@@ -77,10 +77,15 @@ class Weights:
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds of the inputs (paper, Eq. 6)."""
+    """Bounds of the inputs (paper, Eq. 6), which always hold, and bounds that are softened exactly."""
 
     input_min: np.ndarray = _array(4)  # (4,) [m/s^2, rad, rad, rad/s]
     input_max: np.ndarray = _array(4)  # (4,)
+    input_rate: np.ndarray = _array(4, 0.0)  # (4,) [m/s^3, rad/s, rad/s, rad/s^2]
+    speed: float = _positive()  # [m/s]
+    fence_min: np.ndarray = _array(3)  # (3,) [m] least x, y and height
+    fence_max: np.ndarray = _array(3)  # (3,) [m]
+    soft_weight: float = _positive()  # [1/m] of the L1 penalty on what is softened
 
 
     def within(self, vehicle: Vehicle) -> "Limits":
@@ -88,7 +93,8 @@ class Limits:
         thrust_map, tilt = vehicle.thrust_map, vehicle.tilt_limit
         low = np.array([thrust_map.thrust(thrust_map.minimum), -tilt, -tilt, -np.inf])
         high = np.array([thrust_map.thrust(thrust_map.maximum), tilt, tilt, np.inf])
-        return Limits(np.maximum(self.input_min, low), np.minimum(self.input_max, high))
+        low, high = np.maximum(self.input_min, low), np.minimum(self.input_max, high)
+        return replace(self, input_min=low, input_max=high)
 
 
 @dataclass(frozen=True)
@@ -96,6 +102,7 @@ class Avoidance:
     """Repulsive potential of Eq. 8, with the distance counted from the hull."""
 
     enabled: bool = field()
+    term: str = field(metadata={"choices": ("potential", "hard")})  # Eq. 8 in the cost, or Eq. 7 softened exactly
     eta: float = _non_negative()  # gain of the potential
     safety_distance: float = _non_negative()  # [m] hull to surface
     inflation: float = _non_negative()  # [m] added to the distance at which the potential begins

@@ -14,7 +14,7 @@ from typing import List, Optional, Tuple
 import casadi as ca
 import numpy as np
 
-from nmpc_control.ocp import THETA_SIZE, Structure, Symbols, next_state, residuals, stage_cost
+from nmpc_control.ocp import THETA_SIZE, Structure, Symbols, augmented_residuals, inequalities, next_state
 from nmpc_control.state import NU, NX
 
 NZ = NX + NU  # state of the recursion: x and the input before
@@ -24,12 +24,13 @@ _ACTIVE_TOLERANCE = 1e-9  # [input unit] distance at which an input counts as on
 def sweeps(structure: Structure) -> Tuple[ca.Function, ca.Function, ca.Function]:
     """Return the functions ``backward``, ``backward_exact`` and ``forward`` over the whole horizon.
 
-    backward(X (10, N+1), U (4, N), u_before (4,), stages, theta, damping) ->
+    backward(X (10, N+1), U (4, N), u_before (4,), stages, theta, multipliers (nc, N+1), damping) ->
         gains (4, 14 N), step (4, N), summary (4,): slope of the cost along the step, largest projected
         gradient (scaled by the input ranges), number of active bounds, least pivot of the recursion
     backward_exact: the same with the exact Hessian of the Lagrangian, which need not be positive: the least
         pivot says whether its step may be used
-    forward(x0 (10,), u_before (4,), X, U, gains, step, alpha, stages, theta) -> X_new, U_new, cost
+    forward(x0 (10,), u_before (4,), X, U, gains, step, alpha, stages, theta, multipliers) -> X_new, U_new,
+        cost (of the augmented Lagrangian, up to a constant), inequalities (nc, N+1)
     """
     return _backward(structure, False), _backward(structure, True), _forward(structure)
 
@@ -40,34 +41,35 @@ def _backward(structure: Structure, exact: bool) -> ca.Function:
     X, U = ca.MX.sym("X", NX, N + 1), ca.MX.sym("U", NU, N)
     u_before, stages = ca.MX.sym("u_before", NU), ca.MX.sym("stages", structure.stage_size, N + 1)
     theta, damping = ca.MX.sym("theta", THETA_SIZE), ca.MX.sym("damping")
-    xs, us, data = ca.horzsplit(X), ca.horzsplit(U), ca.horzsplit(stages)
-    P, s, adjoint = last(xs[N], data[N], theta)
+    multipliers = ca.MX.sym("multipliers", structure.inequalities, N + 1)
+    xs, us, data, lam = ca.horzsplit(X), ca.horzsplit(U), ca.horzsplit(stages), ca.horzsplit(multipliers)
+    P, s, adjoint = last(xs[N], data[N], theta, lam[N])
     gains: List[ca.MX] = [None] * N
     step: List[ca.MX] = [None] * N
     summary = ca.MX([0.0, 0.0, 0.0, np.inf])
     for k in reversed(range(N)):
         before = us[k - 1] if k else u_before
         gains[k], step[k], P, s, adjoint, summary = inner(
-            xs[k], us[k], before, data[k], theta, damping, P, s, adjoint, summary
+            xs[k], us[k], before, data[k], theta, lam[k], damping, P, s, adjoint, summary
         )
     return ca.Function(
         "backward_exact" if exact else "backward",
-        [X, U, u_before, stages, theta, damping],
+        [X, U, u_before, stages, theta, multipliers, damping],
         [ca.horzcat(*gains), ca.horzcat(*step), summary],
-        ["X", "U", "u_before", "stages", "theta", "damping"],
+        ["X", "U", "u_before", "stages", "theta", "multipliers", "damping"],
         ["gains", "step", "summary"],
     )
 
 
 def _terminal_model(structure: Structure, exact: bool) -> ca.Function:
     s = Symbols(structure)
-    r, w = residuals(structure, s, terminal=True)
+    r, w = augmented_residuals(structure, s, terminal=True)
     J = ca.jacobian(r, s.x)
     gradient = 2 * J.T @ (w * r)
     P = ca.SX(NZ, NZ)
     P[:NX, :NX] = ca.hessian(ca.dot(w, r * r), s.x)[0] if exact else 2 * J.T @ (ca.diag(w) @ J)
     adjoint = ca.vertcat(gradient, ca.SX.zeros(NU))
-    return ca.Function("terminal_model", [s.x, s.stage, s.theta], [_upper(P), adjoint, adjoint])
+    return ca.Function("terminal_model", [s.x, s.stage, s.theta, s.multipliers], [_upper(P), adjoint, adjoint])
 
 
 def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
@@ -81,7 +83,7 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
 
     x_next = next_state(structure, s)
     A, B = ca.jacobian(x_next, s.x), ca.jacobian(x_next, s.u)
-    r, w = residuals(structure, s, terminal=False)
+    r, w = augmented_residuals(structure, s, terminal=False)
     z = ca.vertcat(s.x, s.u_before)
     Jz, Ju = ca.jacobian(r, z), ca.jacobian(r, s.u)
     cost_z, cost_u = 2 * Jz.T @ (w * r), 2 * Ju.T @ (w * r)
@@ -120,7 +122,7 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
     )
     return ca.Function(
         "stage_backward",
-        [s.x, s.u, s.u_before, s.stage, s.theta, damping, P_half, value_gradient, adjoint, summary],
+        [s.x, s.u, s.u_before, s.stage, s.theta, s.multipliers, damping, P_half, value_gradient, adjoint, summary],
         [ca.densify(gains), step, _upper(P_before), s_before, adjoint_before, new_summary],
     )
 
@@ -133,34 +135,50 @@ def _forward(structure: Structure) -> ca.Function:
     deviation = ca.vertcat(s.x - x_bar, s.u_before - before_bar)
     law = u_bar + alpha * step + K @ deviation
     u = ca.fmin(ca.fmax(law, s.u_min), s.u_max)
-    x_next, cost = ca.substitute([next_state(structure, s), stage_cost(structure, s, False)], [s.u], [u])
+    outputs = [next_state(structure, s), _augmented_cost(structure, s, False), inequalities(structure, s, False)]
+    x_next, cost, g = ca.substitute(outputs, [s.u], [u])
     inner = ca.Function(
-        "stage_forward", [s.x, s.u_before, x_bar, u_bar, before_bar, K, step, alpha, s.stage, s.theta],
-        [x_next, u, cost],
+        "stage_forward",
+        [s.x, s.u_before, x_bar, u_bar, before_bar, K, step, alpha, s.stage, s.theta, s.multipliers],
+        [x_next, u, cost, ca.densify(g)],
     )
-    last = ca.Function("terminal_cost", [s.x, s.stage, s.theta], [stage_cost(structure, s, True)])
+    g = ca.vertcat(inequalities(structure, s, True), -ca.SX.ones(2 * NU))
+    last = ca.Function(
+        "terminal_cost", [s.x, s.stage, s.theta, s.multipliers], [_augmented_cost(structure, s, True), ca.densify(g)]
+    )
 
     x0, u_before, length = ca.MX.sym("x0", NX), ca.MX.sym("u_before", NU), ca.MX.sym("alpha")
     X, U = ca.MX.sym("X", NX, N + 1), ca.MX.sym("U", NU, N)
     gains, steps = ca.MX.sym("gains", NU, NZ * N), ca.MX.sym("step", NU, N)
     stages, theta = ca.MX.sym("stages", structure.stage_size, N + 1), ca.MX.sym("theta", THETA_SIZE)
+    multipliers = ca.MX.sym("multipliers", structure.inequalities, N + 1)
+    lam = ca.horzsplit(multipliers)
     xs, us, data, ks = ca.horzsplit(X), ca.horzsplit(U), ca.horzsplit(stages), ca.horzsplit(gains, NZ)
     step_k = ca.horzsplit(steps)
     x, before, before_nominal, total = x0, u_before, u_before, 0
-    X_new, U_new = [x0], []
+    X_new, U_new, G = [x0], [], []
     for k in range(N):
-        x, u, cost = inner(x, before, xs[k], us[k], before_nominal, ks[k], step_k[k], length, data[k], theta)
+        x, u, cost, g = inner(
+            x, before, xs[k], us[k], before_nominal, ks[k], step_k[k], length, data[k], theta, lam[k]
+        )
         before, before_nominal, total = u, us[k], total + cost
         X_new.append(x)
         U_new.append(u)
-    total += last(x, data[N], theta)
+        G.append(g)
+    cost, g = last(x, data[N], theta, lam[N])
+    total += cost
     return ca.Function(
         "forward",
-        [x0, u_before, X, U, gains, steps, length, stages, theta],
-        [ca.horzcat(*X_new), ca.horzcat(*U_new), total],
-        ["x0", "u_before", "X", "U", "gains", "step", "alpha", "stages", "theta"],
-        ["X_new", "U_new", "cost"],
+        [x0, u_before, X, U, gains, steps, length, stages, theta, multipliers],
+        [ca.horzcat(*X_new), ca.horzcat(*U_new), total, ca.horzcat(*G, g)],
+        ["x0", "u_before", "X", "U", "gains", "step", "alpha", "stages", "theta", "multipliers"],
+        ["X_new", "U_new", "cost", "inequalities"],
     )
+
+
+def _augmented_cost(structure: Structure, s: Symbols, terminal: bool) -> ca.SX:
+    r, w = augmented_residuals(structure, s, terminal)
+    return ca.dot(w, r * r)
 
 
 def _upper(P: ca.SX) -> ca.SX:

@@ -2,7 +2,7 @@
 """What every solver backend takes as a guess and gives back."""
 
 from dataclasses import dataclass
-from typing import Optional
+from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -11,11 +11,12 @@ from nmpc_control.state import GRAVITY, NU, NX
 
 @dataclass(frozen=True)
 class Guess:
-    """Where a solver starts: states (N + 1, 10), inputs (N, 4), feedback gains (N, 4, 14) or None."""
+    """Where a solver starts; gains and multipliers only help the compiled one."""
 
-    states: np.ndarray
-    inputs: np.ndarray
-    gains: Optional[np.ndarray] = None
+    states: np.ndarray  # (N + 1, 10)
+    inputs: np.ndarray  # (N, 4)
+    gains: Optional[np.ndarray] = None  # (N, 4, 14) feedback on state and previous input
+    multipliers: Optional[np.ndarray] = None  # (N + 1, nc) of the softened inequalities
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,15 @@ class Solution:
     kkt_residual: float  # largest projected gradient, scaled by the input ranges
     active_bounds: int
     solve_time: float  # [s] wall time
+    violation: float = 0.0  # [m], [m/s] or fraction of an input's range: most by which a softened bound is exceeded
+    softened: str = ""  # which kind of bound that is; empty while all hold
     gains: Optional[np.ndarray] = None  # (N, 4, 14) feedback on state and previous input
+    multipliers: Optional[np.ndarray] = None  # (N + 1, nc) of the softened inequalities
+
+    @property
+    def guess(self) -> Guess:
+        """The solution as a guess for the next solve."""
+        return Guess(self.states, self.inputs, self.gains, self.multipliers)
 
 
 def cold_guess(x0: np.ndarray, horizon: int) -> Guess:
@@ -52,5 +61,16 @@ def shift(guess: Guess, stages: float) -> Guess:
     states = (1 - part) * guess.states[low] + part * guess.states[low + 1]
     at, low, part = at[:N], np.minimum(low[:N], N - 1), part[:N]
     inputs = (1 - part) * guess.inputs[low] + part * guess.inputs[np.minimum(low + 1, N - 1)]
-    gains = None if guess.gains is None else guess.gains[np.minimum(np.round(at).astype(int), N - 1)]
-    return Guess(states, inputs, gains)
+    nearest = np.minimum(np.round(at).astype(int), N - 1)
+    gains = None if guess.gains is None else guess.gains[nearest]
+    multipliers = guess.multipliers
+    if multipliers is not None:
+        multipliers = multipliers[np.minimum(np.round(np.arange(N + 1) + stages).astype(int), N)]
+    return Guess(states, inputs, gains, multipliers)
+
+
+def worst_violation(g: np.ndarray, kinds: Sequence[str], tolerance: float) -> Tuple[float, str]:
+    """Return the largest excess in the inequalities g (N + 1, nc) and its kind, 0 and "" within the tolerance."""
+    most = g.max(axis=0)
+    row = int(np.argmax(most))
+    return (float(most[row]), kinds[row]) if most[row] > tolerance else (max(0.0, float(most[row])), "")

@@ -4,7 +4,9 @@
 One iteration is a backward sweep (gradient, active bounds, Newton step with feedback; ``riccati``) and a
 rollout along it, shortened until the cost falls enough (Armijo), with Levenberg damping where no length
 helps. Because dynamics and bounds hold exactly at every iterate, the cost itself is the merit function and
-a solve cut off by its wall-time budget still returns a plan that can be flown.
+a solve cut off by its wall-time budget still returns a plan that can be flown. Inequalities beside the input bounds
+enter by an augmented Lagrangian whose multipliers, bounded by the weight of the L1 penalty, are updated whenever the
+inner iteration has converged.
 """
 
 import logging
@@ -13,10 +15,11 @@ from typing import Dict, Optional, Tuple
 
 import numpy as np
 
+from nmpc_control import constraints
 from nmpc_control.compiled_function import Buffered, compile_functions
 from nmpc_control.ocp import Instance, Structure
 from nmpc_control.riccati import NZ, sweeps
-from nmpc_control.solution import Guess, Solution, cold_guess
+from nmpc_control.solution import Guess, Solution, cold_guess, worst_violation
 from nmpc_control.state import NU
 
 LOGGER = logging.getLogger(__name__)
@@ -26,6 +29,7 @@ _LEAST_PIVOT = 1e-6
 _SHORTEST_STEP = 1.0 / 64.0
 _DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
 _DECREASE = 1e-3  # times tolerance: a smaller predicted change of the cost, relative, counts as none
+_EXCESS = 1e-3  # [m], [m/s], [1] by which a softened bound may be exceeded at convergence
 _ROUNDING = 1e-9  # a smaller predicted change, relative, is rounding
 
 
@@ -40,6 +44,9 @@ class SqpSolver:
         self._backward = Buffered(functions["backward"], self._arrays)
         self._backward_exact = Buffered(functions["backward_exact"], self._arrays)
         self._forward = Buffered(functions["forward"], self._arrays)
+        self._kinds = constraints.rows(structure.obstacle_slots)
+        self._curvature = constraints.curvature(structure.obstacle_slots)[:, None]
+        self._inequalities = np.zeros_like(self._arrays["inequalities"])
 
     def solve(self, instance: Instance, guess: Optional[Guess] = None) -> Solution:
         """Return the solution from a guess, or from hover where there is none or it is useless.
@@ -58,8 +65,12 @@ class SqpSolver:
         while np.isfinite(cost):
             slope, residual, active = self._direction(damping, newton)
             if residual <= self.tolerance or -slope <= _DECREASE * self.tolerance * (1.0 + abs(cost)):
-                status = "converged"
-                break
+                moved = self._update_multipliers(instance.soft_weight)
+                if moved <= _EXCESS:
+                    status = "converged"
+                    break
+                cost = self._evaluate()
+                slope, residual, active = self._direction(damping, newton)
             if iterations >= self.max_iterations or time.perf_counter() - start > self.time_budget:
                 status = "budget"
                 break
@@ -73,6 +84,7 @@ class SqpSolver:
                 break
             else:
                 damping, newton = max(damping * _DAMPING_FACTOR, _DAMPING_FIRST), False
+        violation, softened = worst_violation(self._inequalities.T, self._kinds, _EXCESS)
         return Solution(
             found=bool(np.isfinite(cost)),
             status=status,
@@ -83,7 +95,10 @@ class SqpSolver:
             kkt_residual=float(residual),
             active_bounds=int(active),
             solve_time=time.perf_counter() - start,
+            violation=violation,
+            softened=softened,
             gains=a["gains"].T.reshape(-1, NZ, NU).transpose(0, 2, 1).copy(),
+            multipliers=a["multipliers"].T.copy(),
         )
 
     def _begin(self, guess: Optional[Guess], instance: Instance) -> float:
@@ -97,13 +112,26 @@ class SqpSolver:
                 a["gains"][:] = 0.0
             else:
                 a["gains"][:] = candidate.gains.transpose(0, 2, 1).reshape(-1, NU).T
-            a["alpha"][0, 0] = 0.0
-            self._forward()
-            cost = float(a["cost"][0, 0])
+            a["multipliers"][:] = 0.0 if candidate.multipliers is None else candidate.multipliers.T
+            cost = self._evaluate()
             if np.isfinite(cost):
                 self._accept()
                 return cost
         return np.inf
+
+    def _evaluate(self) -> float:
+        """Return the cost of the present iterate, rolled out with its feedback."""
+        self._arrays["alpha"][0, 0] = 0.0
+        self._forward()
+        return float(self._arrays["cost"][0, 0])
+
+    def _update_multipliers(self, weight: float) -> float:
+        """Move the multipliers by the inequalities at the iterate; returns the largest move, as an excess."""
+        old = self._arrays["multipliers"]
+        new = np.clip(old + self._curvature * self._inequalities, 0.0, weight)
+        moved = float(np.max(np.abs(new - old) / self._curvature))
+        old[:] = new
+        return moved
 
     def _direction(self, damping: float, newton: bool) -> Tuple[float, float, int]:
         """Compute step and gains; returns the slope along the step, projected gradient and active bounds.
@@ -136,3 +164,4 @@ class SqpSolver:
     def _accept(self) -> None:
         a = self._arrays
         a["X"][:], a["U"][:] = a["X_new"], a["U_new"]
+        self._inequalities[:] = a["inequalities"]

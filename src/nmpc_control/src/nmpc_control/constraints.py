@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""Inequalities g(x, u) <= 0 of the problem beside the input bounds, each softened exactly.
+
+The problem's penalty on them is rho max(0, g), an L1 penalty: exact, so g <= 0 holds at the solution where it can
+hold at all, and the solution is the nearest one where it cannot (e.g. pushed outside the fence by a gust). The compiled solver reaches it by
+an augmented Lagrangian with multipliers bounded by rho; IPOPT by slack variables.
+"""
+
+from typing import Dict, List, Tuple
+
+import casadi as ca
+import numpy as np
+
+from nmpc_control.state import NU
+
+SPEED, FENCE, RATE, OBSTACLE = "speed", "fence", "input rate", "obstacle"
+# curvature of the augmented Lagrangian per row: about a hundred times that of the tracking cost
+_CURVATURE = {SPEED: 500.0, FENCE: 2000.0, OBSTACLE: 2000.0, RATE: 200.0}
+
+
+def rows(obstacle_slots: int) -> List[str]:
+    """Return the kind of every inequality, in order; the last 2 NU (input rate) do not exist at stage N."""
+    return [SPEED] + [FENCE] * 6 + [OBSTACLE] * obstacle_slots + [RATE] * (2 * NU)
+
+
+def curvature(obstacle_slots: int) -> np.ndarray:
+    """Return the curvature of the augmented Lagrangian of every inequality."""
+    return np.array([_CURVATURE[kind] for kind in rows(obstacle_slots)])
+
+
+def state_inequalities(
+    position: ca.SX, velocity: ca.SX, bounds: Dict[str, ca.SX], distances: List[Tuple[ca.SX, ca.SX]]
+) -> ca.SX:
+    """Return g of speed [m/s], fence (6) [m] and Eq. 7 (one per slot) [m].
+
+    Args:
+        position: (3,) [m].
+        velocity: (3,) [m/s].
+        bounds: ``speed``, ``fence_min`` (3,), ``fence_max`` (3,), ``hard_obstacles`` (1 or 0).
+        distances: per slot distance to the centre and least allowed distance [m].
+    """
+    # of second order in the excess, but smooth at rest, unlike the norm
+    speed = (ca.dot(velocity, velocity) - bounds["speed"] ** 2) / (2 * bounds["speed"])
+    obstacles = [bounds["hard_obstacles"] * (least - d) for d, least in distances]
+    return ca.vertcat(speed, position - bounds["fence_max"], bounds["fence_min"] - position, *obstacles)
+
+
+def rate_inequalities(u: ca.SX, u_before: ca.SX, largest_step: ca.SX, span: ca.SX) -> ca.SX:
+    """Return g (8,) of the input's change from stage to stage, as a fraction of the input's range."""
+    change = u - u_before
+    return ca.vertcat((change - largest_step) / span, (-change - largest_step) / span)
