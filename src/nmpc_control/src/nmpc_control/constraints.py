@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Inequalities g(x, u) <= 0 of the problem beside the input bounds, each softened exactly.
+"""Inequalities g(x) <= 0 of the problem beside the bounds of the inputs, each softened exactly.
 
 The problem's penalty on them is rho max(0, g), an L1 penalty: exact, so g <= 0 holds at the solution where it can
 hold at all, and the solution is the nearest one where it cannot (e.g. pushed outside the fence by a gust). The compiled solver reaches it by
@@ -11,16 +11,14 @@ from typing import Dict, List, Tuple
 import casadi as ca
 import numpy as np
 
-from nmpc_control.state import NU
-
-SPEED, FENCE, RATE, OBSTACLE = "speed", "fence", "input rate", "obstacle"
+SPEED, FENCE, OBSTACLE = "speed", "fence", "obstacle"
 # curvature of the augmented Lagrangian per row: about a hundred times that of the tracking cost
-_CURVATURE = {SPEED: 500.0, FENCE: 2000.0, OBSTACLE: 2000.0, RATE: 200.0}
+_CURVATURE = {SPEED: 500.0, FENCE: 2000.0, OBSTACLE: 2000.0}
 
 
 def rows(obstacle_slots: int) -> List[str]:
-    """Return the kind of every inequality, in order; the last 2 NU (input rate) do not exist at stage N."""
-    return [SPEED] + [FENCE] * 6 + [OBSTACLE] * obstacle_slots + [RATE] * (2 * NU)
+    """Return the kind of every inequality of a stage, in order."""
+    return [SPEED] + [FENCE] * 6 + [OBSTACLE] * obstacle_slots
 
 
 def curvature(obstacle_slots: int) -> np.ndarray:
@@ -28,7 +26,7 @@ def curvature(obstacle_slots: int) -> np.ndarray:
     return np.array([_CURVATURE[kind] for kind in rows(obstacle_slots)])
 
 
-def state_inequalities(
+def inequalities(
     position: ca.SX, velocity: ca.SX, bounds: Dict[str, ca.SX], distances: List[Tuple[ca.SX, ca.SX]]
 ) -> ca.SX:
     """Return g of speed [m/s], fence (6) [m] and Eq. 7 (one per slot) [m].
@@ -43,9 +41,3 @@ def state_inequalities(
     speed = (ca.dot(velocity, velocity) - bounds["speed"] ** 2) / (2 * bounds["speed"])
     obstacles = [bounds["hard_obstacles"] * (least - d) for d, least in distances]
     return ca.vertcat(speed, position - bounds["fence_max"], bounds["fence_min"] - position, *obstacles)
-
-
-def rate_inequalities(u: ca.SX, u_before: ca.SX, largest_step: ca.SX, span: ca.SX) -> ca.SX:
-    """Return g (8,) of the input's change from stage to stage, as a fraction of the input's range."""
-    change = u - u_before
-    return ca.vertcat((change - largest_step) / span, (-change - largest_step) / span)

@@ -46,7 +46,7 @@ class IpoptSolver:
         N = self.structure.horizon
         guess = guess or cold_guess(instance.x0, N)
         free_states, slacks = N * NX + NX, N * (NX + NU) + NX
-        count = self.structure.inequalities * (N + 1) - 2 * NU  # the last stage has no input rate
+        count = self.structure.inequalities * (N + 1)
         lower, upper = np.full(slacks + count, -np.inf), np.full(slacks + count, np.inf)
         lower[:NX] = upper[:NX] = instance.x0
         lower[free_states:slacks], upper[free_states:slacks] = np.tile(instance.input_min, N), np.tile(instance.input_max, N)
@@ -56,7 +56,7 @@ class IpoptSolver:
             x0=np.concatenate([guess.states.ravel(), guess.inputs.ravel(), np.zeros(count)]),
             lbx=lower,
             ubx=upper,
-            lbg=np.concatenate([np.zeros(N * NX), np.full(count, -np.inf)]),
+            lbg=np.concatenate([np.zeros(N * NX), np.full(count + 2 * NU * N, -np.inf)]),
             ubg=0.0,
             p=parameters,
         )
@@ -66,8 +66,7 @@ class IpoptSolver:
         multipliers = np.asarray(result["lam_x"]).ravel()[free_states:slacks]
         g = np.asarray(result["g"]).ravel()
         defect = float(np.max(np.abs(g[: N * NX])))
-        excess = np.zeros((N + 1, self.structure.inequalities))
-        excess.ravel()[:count] = z[slacks:]
+        excess = z[slacks:].reshape(N + 1, self.structure.inequalities)
         violation, softened = worst_violation(excess, self._kinds, _EXCESS)
         status = str(stats["return_status"])
         return Solution(
@@ -91,23 +90,25 @@ def _transcribe(structure: Structure) -> Dict[str, ca.SX]:
     step = ca.Function("step", [s.x, s.u, s.theta], [next_state(structure, s)])
     inner = ca.Function("l", [s.x, s.u, s.u_before, s.stage, s.theta], [stage_cost(structure, s, False)])
     last = ca.Function("l_N", [s.x, s.stage, s.theta], [stage_cost(structure, s, True)])
-    bounds = ca.Function("g", [s.x, s.u, s.u_before, s.stage, s.theta], [inequalities(structure, s, False)])
-    last_bounds = ca.Function("g_N", [s.x, s.stage, s.theta], [inequalities(structure, s, True)])
+    bounds = ca.Function("g", [s.x, s.stage, s.theta], [inequalities(structure, s)])
     X, U = ca.SX.sym("X", NX, N + 1), ca.SX.sym("U", NU, N)
     u_before, theta = ca.SX.sym("u_before", NU), ca.SX.sym("theta", THETA_SIZE)
     stages = ca.SX.sym("stages", structure.stage_size, N + 1)
-    slack = ca.SX.sym("slack", structure.inequalities * (N + 1) - 2 * NU)
+    slack = ca.SX.sym("slack", structure.inequalities * (N + 1))
     soft_weight = theta[PARTS["soft_weight"]]
-    cost, defects, g = last(X[:, N], stages[:, N], theta) + soft_weight * ca.sum1(slack), [], []
+    cost = last(X[:, N], stages[:, N], theta) + soft_weight * ca.sum1(slack)
+    largest_step = structure.dt * theta[PARTS["input_rate"]]
+    defects, g, rates = [], [], []
     for k in range(N):
         before = U[:, k - 1] if k else u_before
         cost += inner(X[:, k], U[:, k], before, stages[:, k], theta)
         defects.append(X[:, k + 1] - step(X[:, k], U[:, k], theta))
-        g.append(bounds(X[:, k], U[:, k], before, stages[:, k], theta))
-    g.append(last_bounds(X[:, N], stages[:, N], theta))
+        rates += [U[:, k] - before - largest_step, before - U[:, k] - largest_step]
+    for k in range(N + 1):
+        g.append(bounds(X[:, k], stages[:, k], theta))
     return {
         "x": ca.vertcat(ca.vec(X), ca.vec(U), slack),
         "f": cost,
-        "g": ca.vertcat(*defects, ca.vertcat(*g) - slack),
+        "g": ca.vertcat(*defects, ca.vertcat(*g) - slack, *rates),
         "p": ca.vertcat(u_before, theta, ca.vec(stages)),
     }

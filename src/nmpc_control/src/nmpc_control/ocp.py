@@ -6,7 +6,8 @@
     subject to x_0 given, u_{-1} the input really applied before, x_{k+1} = F(x_k, u_k), u_min <= u_k <= u_max
 
     U_i(x) = eta / 2 (1 / d_i - 1 / D_i)^2  where d_i < D_i, else 0            (Eq. 8)
-    softened: |v| <= v_max, p_min <= p <= p_max, |u_k - u_{k-1}| <= dt u'_max, and d_i >= D_i (Eq. 7) if selected
+               |u_k - u_{k-1}| <= dt u'_max
+    softened   |v_k| <= v_max, p_min <= p_k <= p_max, and d_i >= D_i (Eq. 7) where that is selected
 
 d_i is the distance to the centre of obstacle i and D_i its radius plus hull plus safety distance. Everything
 but N, dt, the integrator and the number of obstacle slots is a run-time parameter.
@@ -197,22 +198,28 @@ def residuals(structure: Structure, s: Symbols, terminal: bool) -> Tuple[ca.SX, 
     )
 
 
-def inequalities(structure: Structure, s: Symbols, terminal: bool) -> ca.SX:
-    """Return g, to be <= 0, of one stage; the rows of the input rate are missing at the terminal one."""
-    distances = [(_distance(s.x[:3], slot), 1 / slot[4]) for slot in _slots(structure, s.stage)]
-    g = constraints.state_inequalities(s.x[:3], s.x[6:9], s.bounds, distances)
-    if terminal:
-        return g
+def input_bounds(structure: Structure, s: Symbols) -> Tuple[ca.SX, ca.SX]:
+    """Return the least and greatest input (4,) of a stage: its bounds, and what the rate allows from the one before.
+
+    Where both cannot hold (the input before was outside the bounds) the bounds do.
+    """
     step = structure.dt * s.bounds["input_rate"]
-    return ca.vertcat(g, constraints.rate_inequalities(s.u, s.u_before, step, s.u_max - s.u_min))
+    low = ca.fmin(ca.fmax(s.u_min, s.u_before - step), s.u_max)
+    return low, ca.fmax(ca.fmin(s.u_max, s.u_before + step), s.u_min)
+
+
+def inequalities(structure: Structure, s: Symbols) -> ca.SX:
+    """Return g, to be <= 0, of one stage."""
+    distances = [(_distance(s.x[:3], slot), 1 / slot[4]) for slot in _slots(structure, s.stage)]
+    return constraints.inequalities(s.x[:3], s.x[6:9], s.bounds, distances)
 
 
 def augmented_residuals(structure: Structure, s: Symbols, terminal: bool) -> Tuple[ca.SX, ca.SX]:
     """Return residuals and weights of the stage cost with the augmented Lagrangian of the inequalities."""
     r, w = residuals(structure, s, terminal)
-    g = inequalities(structure, s, terminal)
-    mu = ca.DM(constraints.curvature(structure.obstacle_slots)[: g.shape[0]])
-    return ca.vertcat(r, ca.fmax(0, g + s.multipliers[: g.shape[0]] / mu)), ca.vertcat(w, mu / 2)
+    mu = ca.DM(constraints.curvature(structure.obstacle_slots))
+    excess = ca.fmax(0, inequalities(structure, s) + s.multipliers / mu)
+    return ca.vertcat(r, excess), ca.vertcat(w, mu / 2)
 
 
 def stage_cost(structure: Structure, s: Symbols, terminal: bool) -> ca.SX:

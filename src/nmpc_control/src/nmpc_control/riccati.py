@@ -4,8 +4,8 @@
 Backward, from stage N to 0 (discrete-time Riccati recursion of the Gauss-Newton model, see e.g. Frison and
 Jorgensen 2013; here the previous input is part of the state, so that R_delta keeps the stage structure):
 the exact adjoint gives the gradient g of the cost with respect to every input; inputs that sit on a bound
-with the gradient pushing outward are held (Bertsekas 1982, projected Newton); the others get the feedback
-law du = k + K [dx; du_before]. Forward: the model is rolled out under that law with step length alpha, inputs
+with the gradient pushing outward are held (Bertsekas 1982, projected Newton), on a bound of their rate they
+follow the input before; the others get the feedback law du = k + K [dx; du_before]. Forward: the model is rolled out under that law with step length alpha, inputs
 clipped to their bounds, so every iterate satisfies dynamics and bounds exactly.
 """
 
@@ -14,7 +14,7 @@ from typing import List, Optional, Tuple
 import casadi as ca
 import numpy as np
 
-from nmpc_control.ocp import THETA_SIZE, Structure, Symbols, augmented_residuals, inequalities, next_state
+from nmpc_control.ocp import THETA_SIZE, Structure, Symbols, augmented_residuals, inequalities, input_bounds, next_state
 from nmpc_control.state import NU, NX
 
 NZ = NX + NU  # state of the recursion: x and the input before
@@ -91,10 +91,14 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
 
     # exact gradient of the cost along the dynamics, and the bounds that hold an input
     gradient = cost_u + B.T @ adjoint[:NX] + adjoint[NX:]
-    held_low = ca.logic_and(s.u <= s.u_min + _ACTIVE_TOLERANCE, gradient > 0)
-    held_high = ca.logic_and(s.u >= s.u_max - _ACTIVE_TOLERANCE, gradient < 0)
+    low, high = input_bounds(structure, s)
+    held_low = ca.logic_and(s.u <= low + _ACTIVE_TOLERANCE, gradient > 0)
+    held_high = ca.logic_and(s.u >= high - _ACTIVE_TOLERANCE, gradient < 0)
     free = 1 - ca.logic_or(held_low, held_high)
-    adjoint_before = cost_z + ca.vertcat(A.T @ adjoint[:NX], ca.SX.zeros(NU))
+    # an input held by its rate follows the input before
+    by_rate = ca.logic_or(ca.logic_and(held_low, low > s.u_min), ca.logic_and(held_high, high < s.u_max))
+    H = ca.horzcat(ca.SX(NU, NX), ca.diag(by_rate))
+    adjoint_before = cost_z + ca.vertcat(A.T @ adjoint[:NX], by_rate * gradient)
 
     # quadratic model of the cost to go in (dz, du)
     PA, BP = Pxx @ A, B.T @ Pxx + Pxu.T
@@ -106,14 +110,16 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
 
     F = ca.diag(free)
     L, pivots = _cholesky(F @ (Quu + damping * ca.SX.eye(NU)) @ F + ca.diag(1 - free))
+    coupling = F @ (Quz + Quu @ H)
     step = -_solve(L, free * qu)
-    gains = -_solve(L, F @ Quz)
-    half = _forward_substitution(L, F @ Quz)
-    P_before = Qzz - half.T @ half
-    s_before = qz + (F @ Quz).T @ step
+    gains = H - _solve(L, coupling)
+    half = _forward_substitution(L, coupling)
+    mixed = H.T @ Quz
+    P_before = Qzz + mixed + mixed.T + H.T @ Quu @ H - half.T @ half
+    s_before = qz + H.T @ qu + coupling.T @ step
 
     span = s.u_max - s.u_min
-    violation = ca.mmax(ca.fabs(s.u - ca.fmin(ca.fmax(s.u - gradient * span**2, s.u_min), s.u_max)) / span)
+    violation = ca.mmax(ca.fabs(s.u - ca.fmin(ca.fmax(s.u - gradient * span**2, low), high)) / span)
     new_summary = ca.vertcat(
         summary[0] + ca.dot(free * qu, step),  # qu is the gradient under the feedback of the later stages
         ca.fmax(summary[1], violation),
@@ -134,15 +140,16 @@ def _forward(structure: Structure) -> ca.Function:
     K, step, alpha = ca.SX.sym("K", NU, NZ), ca.SX.sym("step", NU), ca.SX.sym("alpha")
     deviation = ca.vertcat(s.x - x_bar, s.u_before - before_bar)
     law = u_bar + alpha * step + K @ deviation
-    u = ca.fmin(ca.fmax(law, s.u_min), s.u_max)
-    outputs = [next_state(structure, s), _augmented_cost(structure, s, False), inequalities(structure, s, False)]
+    low, high = input_bounds(structure, s)
+    u = ca.fmin(ca.fmax(law, low), high)
+    outputs = [next_state(structure, s), _augmented_cost(structure, s, False), inequalities(structure, s)]
     x_next, cost, g = ca.substitute(outputs, [s.u], [u])
     inner = ca.Function(
         "stage_forward",
         [s.x, s.u_before, x_bar, u_bar, before_bar, K, step, alpha, s.stage, s.theta, s.multipliers],
         [x_next, u, cost, ca.densify(g)],
     )
-    g = ca.vertcat(inequalities(structure, s, True), -ca.SX.ones(2 * NU))
+    g = inequalities(structure, s)
     last = ca.Function(
         "terminal_cost", [s.x, s.stage, s.theta, s.multipliers], [_augmented_cost(structure, s, True), ca.densify(g)]
     )

@@ -30,6 +30,7 @@ _SHORTEST_STEP = 1.0 / 64.0
 _DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
 _DECREASE = 1e-3  # times tolerance: a smaller predicted change of the cost, relative, counts as none
 _EXCESS = 1e-3  # [m], [m/s], [1] by which a softened bound may be exceeded at convergence
+_FIRST_ACCURACY = 1e-3  # predicted relative change of the cost at which the multipliers are first updated
 _ROUNDING = 1e-9  # a smaller predicted change, relative, is rounding
 
 
@@ -61,16 +62,18 @@ class SqpSolver:
         a["stages"][:], a["theta"][:, 0] = instance.stages, instance.theta
         cost = self._begin(guess, instance)
         damping, iterations, status, residual, active = 0.0, 0, "failed", np.inf, 0
-        newton = False
+        newton, accuracy, final = False, _FIRST_ACCURACY, _DECREASE * self.tolerance
         while np.isfinite(cost):
             slope, residual, active = self._direction(damping, newton)
-            if residual <= self.tolerance or -slope <= _DECREASE * self.tolerance * (1.0 + abs(cost)):
+            if residual <= self.tolerance or -slope <= accuracy * (1.0 + abs(cost)):
                 moved = self._update_multipliers(instance.soft_weight)
-                if moved <= _EXCESS:
+                if moved <= _EXCESS and (residual <= self.tolerance or accuracy <= final):
                     status = "converged"
                     break
-                cost = self._evaluate()
-                slope, residual, active = self._direction(damping, newton)
+                accuracy = final if moved <= _EXCESS else max(final, accuracy / 10.0)
+                if moved > 0.0:
+                    cost = self._evaluate()
+                    slope, residual, active = self._direction(damping, newton)
             if iterations >= self.max_iterations or time.perf_counter() - start > self.time_budget:
                 status = "budget"
                 break
