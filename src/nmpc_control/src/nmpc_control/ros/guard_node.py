@@ -12,6 +12,7 @@ ROS Parameters:
     ~avoidance (bool): false leaves obstacles out of the plan check.
 """
 
+import os
 import queue
 import signal
 import sys
@@ -36,6 +37,7 @@ from nmpc_control.ros.guard_listener import GuardListener
 from nmpc_control.ros.guard_reports import GuardReports
 
 ANSWER_TIMEOUT = 2.0  # [s] wall time in which a tick must answer a service call
+NICENESS = -10  # ahead of solver, recorder and desktop, where the system allows it
 
 
 class _Question:
@@ -139,7 +141,9 @@ class GuardNode:
 def main() -> None:
     """Entry point of the node: exit status 2 on bad parameters, 1 where it must not fly."""
     rospy.init_node("flight_guard", disable_signals=True)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
+    _ask_for_priority()
     try:
         guard = _guard()
         GuardNode(guard, bool(rospy.get_param("~avoidance", True))).run()
@@ -159,6 +163,13 @@ def _guard() -> Guard:
         where = f"vehicles/{vehicle.name}.yaml: thrust_map.measured_on is empty"
         sys.exit(_refuse(f"{where}: thrust is not commanded through an unmeasured map", 1))
     return Guard(params, vehicle, parameters.limits)
+
+
+def _ask_for_priority() -> None:
+    try:
+        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
+    except PermissionError:
+        rospy.loginfo("no right to a higher priority: give it by limits.conf, nice")
 
 
 def _refuse(sentence: str, status: int) -> int:
