@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
 import dataclasses
+import signal
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -20,17 +23,21 @@ def flight(ros):
 
 
 def test_a_dead_controller_leaves_a_held_aircraft_that_still_lands(flight):
+    bare = flight.start(sys.executable, str(Path(__file__).parent / "bare_stream.py"))
     seen = flight.run_json("guard_client.py", "controller_dies", timeout=120)
+    bare.send_signal(signal.SIGINT)
+    bare.wait(20)
+    machine = float(flight.output_of(bare).split()[-1]) / 1e3  # [s] its longest gap just now
     assert seen["start"] == [True, "taking off"]
     assert seen["second_start"] == [False, "automatic flight is under way: hovering"]
     assert seen["hover"] == [True, "hovering"]
     assert 0.3 < seen["stopped_at"] < 7.0  # on the way to 10
-    assert 0.3 < seen["takeover"] < 1.0  # the last verified plan is flown for 0.5 s
+    assert 0.3 < seen["takeover"] < 0.7 + machine  # the last verified plan is flown for 0.5 s
     assert seen["status"][0] == BRAKE
     assert seen["status"][1].startswith("the plan is 0.5")
     assert seen["flag"] == VELOCITY
     assert seen["drift"] < 0.3
-    assert seen["gap"] < 0.25  # the stream goes on through the change; jitter is the machine's
+    assert seen["gap"] <= max(0.040, machine + 0.015)  # the stream goes on through the change
     assert seen["land"] == [True, "landing"]
     assert seen["height"] < 0.05
     flown = ["TAKING_OFF", "HOVERING", "FLYING", "HOVERING", "BRAKING", "LANDING", "WAITING"]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Small bags with known answers, written with the message definitions of this workspace."""
 
 from pathlib import Path
