@@ -83,9 +83,9 @@ def main() -> None:
     )
     times = np.linspace(0.0, scenario.trajectory.duration, 600)
     whole = MultiDOFJointTrajectory(header=header, joint_names=[scenario.name])
-    for point in scenario.trajectory.sample(times).position:
+    for t, point in zip(times, scenario.trajectory.sample(times).position):
         transform = Transform(Vector3(*point), Quaternion(0, 0, 0, 1))
-        whole.points.append(MultiDOFJointTrajectoryPoint([transform], [], [], rospy.Duration(0)))
+        whole.points.append(MultiDOFJointTrajectoryPoint([transform], [], [], rospy.Duration(t)))
     trajectory.publish(whole)
     rospy.sleep(0.3)
 

@@ -13,6 +13,7 @@ import sys
 from xmlrpc.client import ServerProxy
 
 import rospy
+from geometry_msgs.msg import Point, PoseStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Header
@@ -38,6 +39,7 @@ class Client:
             "dji_sdk/flight_control_setpoint_generic", Joy, self.setpoints.append, queue_size=100
         )
         rospy.Subscriber("uav_sim/ground_truth", Odometry, self._on_truth, queue_size=1)
+        self.target = rospy.Publisher("command/pose", PoseStamped, queue_size=1)
         self.rc = rospy.Publisher("dji_sdk/rc", Joy, queue_size=1)
 
     def _on_truth(self, message):
@@ -65,6 +67,12 @@ class Client:
         rospy.sleep(1.0)
         return answer
 
+    def go_to(self, x, y, z):
+        pose = PoseStamped(header=Header(frame_id="world"))
+        pose.pose.position = Point(x, y, z)
+        pose.pose.orientation.w = 1.0
+        self.target.publish(pose)
+
     def modes(self):
         """Return the modes in the order in which they came."""
         names = [MODES[status.mode] for status in self.statuses]
@@ -89,6 +97,13 @@ def controller_dies():
     """Take off, lose the controller, hold, land."""
     client = Client()
     seen = {"start": client.hover(), "second_start": client.ask("start")}
+    client.go_to(10.0, 0.0, 3.0)
+    client.wait("FLYING")
+    rospy.sleep(1.5)
+    seen["hover"] = client.ask("hover")
+    client.wait("HOVERING", 1.0)
+    rospy.sleep(3.0)
+    seen["stopped_at"] = client.position[0]
     kill("/nmpc_controller", signal.SIGKILL)
     died, where = rospy.Time.now().to_sec(), list(client.position)
     braking = client.wait("BRAKING", 3.0)

@@ -107,6 +107,11 @@ class RosSession:
             assert time.monotonic() < deadline, f"no node {name}\n{self.output()}"
             time.sleep(0.1)
 
+    def output_of(self, process: subprocess.Popen) -> str:
+        """Return all that a program started here has printed."""
+        number = self._processes.index(process)
+        return (self.directory / f"output_{number}.txt").read_text(encoding="utf-8")
+
     def output(self) -> str:
         """Return the last lines of everything that was started, for a failure's text."""
         parts = []

@@ -39,12 +39,14 @@ def odometry(t: float, position: Tuple[float, float, float], q: Quaternion = LEV
     return message
 
 
-def trajectory(points: np.ndarray, stamp: float = 0.0) -> MultiDOFJointTrajectory:
+def trajectory(
+    points: np.ndarray, stamp: float = 0.0, duration: float = 1e6
+) -> MultiDOFJointTrajectory:
     message = MultiDOFJointTrajectory(joint_names=["test"])
     message.header.stamp = rospy.Time.from_sec(stamp)
-    for point in points:
+    for t, point in zip(np.linspace(0.0, duration, len(points)), points):
         transform = Transform(Vector3(*point), LEVEL)
-        message.points.append(MultiDOFJointTrajectoryPoint([transform], [], [], rospy.Duration(0)))
+        message.points.append(MultiDOFJointTrajectoryPoint([transform], [], [], rospy.Duration(t)))
     return message
 
 
@@ -178,8 +180,8 @@ def test_time_labels_count_from_the_start_of_the_clock(scene: Scene) -> None:
     for t in np.arange(0.0, 20.0, 0.1):
         scene.set_odometry(odometry(t, (-1.0, t / 10, 1.0)))
     assert not named(scene.changes(), "times")
-    scene.set_trajectory(trajectory(way, stamp=20.0))
-    for t in np.arange(20.0, 33.0, 0.1):
+    scene.set_trajectory(trajectory(way, stamp=20.0, duration=12.0))
+    for t in np.arange(20.0, 43.0, 0.1):
         scene.set_odometry(odometry(t, (t - 20.0, 0.0, 1.0)))
     labels = named(scene.changes(), "times")
     assert [label.text for label in labels] == ["0s", "5s", "10s"]

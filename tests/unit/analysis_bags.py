@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Small bags with known answers, written with the message definitions of this workspace."""
 
 from pathlib import Path
@@ -133,12 +134,12 @@ class BagBuilder:
 
 
 class Flight:
-    """Along x: reference 0.5 m/s for 20 s, estimate 0.25 m beside it, truth 0.05 m more."""
+    """Along x: reference 1 m/s for 10 s, estimate 0.25 m beside it, truth 0.05 m more."""
 
-    start, duration, speed, height = 110.0, 20.0, 0.5, 2.0
+    start, duration, speed, height = 110.0, 10.0, 1.0, 2.0
     offset = np.array([0.0, 0.25, 0.0])
     drift = np.array([0.0, 0.05, 0.0])
-    take_off, land, end = 100.0, 135.0, 140.0
+    take_off, land, end = 104.0, 124.0, 128.0
     spheres = (("ball", (5.0, 2.0, 2.0), 0.5), ("far", (5.0, -4.0, 2.0), 1.0))
 
     def reference(self, t):
@@ -164,7 +165,7 @@ class Flight:
         times = np.arange(0.0, self.duration + 0.025, 0.05)
         path = [self.reference(self.start + t) for t in times]
         bag.obstacles(self.take_off - 2.0, self.spheres)
-        bag.trajectory(self.take_off + 6.0, 0.0, name, times, path)
+        bag.trajectory(self.take_off + 4.0, 0.0, name, times, path)
         bag.trajectory(self.start, self.start, name, times, path)
         for k in range(round(50 * self.take_off) - 100, round(50 * self.end) + 50):
             t = k / 50.0

@@ -25,7 +25,7 @@ TOPICS = (
 class LaterFlight(Flight):
     """100 s later, 0.1 m beside its reference, with another obstacle."""
 
-    start, take_off, land, end = 210.0, 200.0, 235.0, 240.0
+    start, take_off, land, end = 210.0, 204.0, 224.0, 228.0
     offset = np.array([0.0, 0.1, 0.0])
     spheres = (("post", (5.0, 3.0, 2.0), 1.0),)
 
@@ -53,11 +53,11 @@ def test_whole_flight(metrics):
     assert metrics["average_deviation_truth_m"] == pytest.approx(0.3, abs=1e-9)
     assert metrics["average_deviation_retimed_m"] == pytest.approx(0.25, abs=1e-9)
     assert metrics["average_path_deviation_m"] == pytest.approx(0.25, abs=1e-9)
-    assert metrics["scenario_time_s"] == pytest.approx(20.0)
+    assert metrics["scenario_time_s"] == pytest.approx(10.0)
     assert metrics["arrived"] is True
-    assert metrics["navigation_time_s"] == pytest.approx(20.0, abs=0.021)
-    assert metrics["total_time_s"] == pytest.approx(40.0)
-    assert metrics["airborne_time_s"] == pytest.approx(38.0)
+    assert metrics["navigation_time_s"] == pytest.approx(10.0, abs=0.021)
+    assert metrics["total_time_s"] == pytest.approx(24.0)
+    assert metrics["airborne_time_s"] == pytest.approx(22.0)
     assert metrics["thrust_percent"] == pytest.approx([38.0, 38.6], abs=1e-5)
     assert metrics["command_gap_ms_max"] == pytest.approx(20.0, abs=1e-3)
     assert metrics["collisions"] == 0
@@ -80,8 +80,8 @@ def test_header_stamps_count_not_the_time_of_recording(flight, tmp_path):
 
 def test_body_velocities_are_turned_into_the_world(bag):
     record = read_flight(bag)
-    flying = record.velocity.between(record.reference.start, record.reference.start + 19.0)
-    assert flying.values == pytest.approx(np.tile([0.5, 0.0, 0.0], (len(flying), 1)), abs=1e-9)
+    flying = record.velocity.between(record.reference.start, record.reference.start + 9.0)
+    assert flying.values == pytest.approx(np.tile([1.0, 0.0, 0.0], (len(flying), 1)), abs=1e-9)
     assert record.attitude.values[0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
 
 
@@ -135,7 +135,7 @@ def test_two_trajectories_in_one_bag(tmp_path):
     assert (last["flight"], last["flights"], last["scenario"]) == (2, 2, "second")
     assert last["average_deviation_m"] == pytest.approx(0.1, abs=1e-9)
     assert list(last["clearance_m"]) == ["post"]
-    assert last["total_time_s"] == pytest.approx(40.0)
+    assert last["total_time_s"] == pytest.approx(24.0)
     one = flight_metrics(read_flight(path, flight=1))
     assert (one["flight"], one["scenario"]) == (1, "first")
     assert one["average_deviation_m"] == pytest.approx(0.25, abs=1e-9)
@@ -146,70 +146,18 @@ def test_two_trajectories_in_one_bag(tmp_path):
 
 def test_next_trajectory_without_landing_ends_the_phase(flight, tmp_path):
     builder = flight.without("nothing")
-    builder.trajectory(132.0, 0.0, "next", [0.0, 1.0], [[0, 0, 2], [1, 0, 2]])
+    builder.trajectory(122.0, 0.0, "next", [0.0, 1.0], [[0, 0, 2], [1, 0, 2]])
     record = read_flight(builder.write(tmp_path / "next.bag"))
-    assert record.phase_end - record.reference.start == pytest.approx(22.0, abs=0.01)
+    assert record.phase_end - record.reference.start == pytest.approx(12.0, abs=0.01)
 
 
 def test_latched_trajectory_that_is_recorded_again_is_one_flight(flight, tmp_path):
     builder = flight.without("nothing")
     again = [m for m in flight.messages if m[0].endswith("nmpc/trajectory")][1]
-    builder.messages.append((again[0], again[1], 125.0, again[3]))
+    builder.messages.append((again[0], again[1], 118.0, again[3]))
     record = read_flight(builder.write(tmp_path / "again.bag"))
     assert record.flight == (1, 1)
     assert record.phase_end is None
-
-
-def test_samples_that_are_not_finite_are_left_out_and_counted(flight, metrics, tmp_path):
-    builder = flight.without("nothing")
-    for k in range(7):
-        bad = (np.nan, 0.0, 0.0) if k % 2 else (0.0, np.inf, 0.0)
-        builder.odometry("nmpc/odometry", 115.001 + k, bad, (0.0, 0.0, 0.0))
-    builder.plan(115.0, 1000, np.nan)
-    figures = flight_metrics(read_flight(builder.write(tmp_path / "nan.bag")))
-    assert figures["average_deviation_m"] == pytest.approx(0.25, abs=1e-9)
-    assert figures["solver_iterations_mean"] == metrics["solver_iterations_mean"]
-    assert figures["missing"] == [
-        "nmpc/odometry: 7 samples are not finite: left out",
-        "nmpc/plan: 1 samples are not finite: left out",
-    ]
-
-
-def test_stamps_out_of_order_are_sorted(flight, metrics, tmp_path):
-    builder = BagBuilder()
-    order = np.random.default_rng(0).permutation(len(flight.messages))
-    recorded = sorted(m[2] for m in flight.messages)
-    shuffled = [flight.messages[i] for i in order]
-    stamped = [m for m in shuffled if not m[0].endswith(("flight_status", "nmpc/trajectory"))]
-    rest = [m for m in shuffled if m[0].endswith(("flight_status", "nmpc/trajectory"))]
-    builder.messages = [(a, b, t, v) for (a, b, _, v), t in zip(stamped, recorded)] + rest
-    figures = flight_metrics(read_flight(builder.write(tmp_path / "shuffled.bag")))
-    for key in ("average_deviation_m", "command_gap_ms_max", "navigation_time_s", "total_time_s"):
-        assert figures[key] == pytest.approx(metrics[key], abs=1e-6), key
-
-
-def test_meaning_of_a_setpoint_is_in_its_flag(tmp_path):
-    builder = BagBuilder()
-    for k in range(100):
-        builder.status(100.0 + 0.02 * k, FLYING)
-    builder.setpoint(100.0, 0.1, 0.2, 37.0, 0.3, flag=0x2B)
-    builder.setpoint(100.5, 9.0, 9.0, 99.0, 9.0, flag=0x49)  # velocities
-    builder.setpoint(101.0, 0.4, 0.5, 88.0, 0.6, flag=0x0B)  # attitude and vertical velocity
-    record = read_flight(builder.write(tmp_path / "flags.bag"))
-    expected = [[37.0, 0.1, 0.2, 0.3], [np.nan, np.nan, np.nan, 9.0], [np.nan, 0.4, 0.5, 0.6]]
-    np.testing.assert_allclose(record.commands.values, expected, atol=1e-6)
-    figures = flight_metrics(record)
-    assert figures["thrust_percent"] == pytest.approx([37.0, 37.0])
-    assert figures["command_gap_ms_max"] == pytest.approx(500.0, abs=1e-3)
-
-
-def test_short_setpoint_is_counted_as_unusable(flight, tmp_path):
-    builder = flight.without("nothing")
-    values = {"axes": [0.1, 0.2]}
-    topic = "dji_sdk/flight_control_setpoint_generic"
-    builder.add(topic, "sensor_msgs/msg/Joy", 112.0, values)
-    missing = read_flight(builder.write(tmp_path / "short.bag")).missing
-    assert missing == (f"{topic}: 1 messages cannot be used: left out",)
 
 
 def test_obstacle_that_moves_appears_and_goes(flight, tmp_path):
@@ -247,20 +195,12 @@ def test_collision_is_counted_from_truth_and_from_the_simulator(flight, tmp_path
 
 def test_bag_that_ends_in_the_air_says_so(flight, tmp_path):
     builder = BagBuilder()
-    builder.messages = [m for m in flight.messages if m[2] < 128.0]
+    builder.messages = [m for m in flight.messages if m[2] < 118.0]
     figures = flight_metrics(read_flight(builder.write(tmp_path / "cut.bag")))
     assert figures["arrived"] is False
     assert "the bag ends before the landing did: total time is up to its end" in figures["missing"]
     assert any("ended 2.0 s before its reference" in s for s in figures["missing"])
     assert figures["average_deviation_m"] == pytest.approx(0.25, abs=1e-9)
-
-
-def test_topic_of_another_type_is_named(flight, tmp_path):
-    builder = flight.without("nmpc/plan")
-    builder.add("nmpc/plan", "std_msgs/msg/String", 100.0, {"data": "plan"})
-    figures = flight_metrics(read_flight(builder.write(tmp_path / "type.bag")))
-    assert "/nmpc/plan has type std_msgs/msg/String: not read" in figures["missing"]
-    assert figures["solver_iterations_mean"] is None
 
 
 def test_landing_is_not_streaming(tmp_path):

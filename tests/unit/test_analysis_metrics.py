@@ -17,7 +17,7 @@ TIMES = np.arange(4000, 9000) / 100.0
 
 
 def reference():
-    times = np.arange(0.0, DURATION + 0.01, 0.02)
+    times = np.linspace(0.0, DURATION, 201)
     return Reference(START, Series(times, np.outer(times, [0.5, 0.0, 0.0])))
 
 

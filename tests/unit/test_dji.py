@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What goes out to the flight controller, against the self-test vectors of the facts sheet."""
+"""What goes out to the flight controller: bytes and signs of uav_sim/doc/dji_sdk.md."""
 
 import dataclasses
 import math

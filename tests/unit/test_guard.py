@@ -413,6 +413,18 @@ def test_the_brake_is_bounded_and_changes_slowly():
     assert (applied <= LIMITS.input_max).all()
 
 
+def test_losing_gps_while_it_holds_goes_on_with_the_brake_from_level():
+    tilted = [9.81, 0.0, 0.3, 0.0]
+    flight = Flight(aircraft=airborne()).hovering()
+    flight.solver = lambda t, x: (make_plan(x, t, tilted), Goal.HOLD)
+    flight.run(0.5)
+    flight.solver = None
+    assert flight.run(2.0).axes[4] == dji.VELOCITY
+    output = flight.tick(gps_health=2)
+    assert output.axes[4] == dji.ATTITUDE_THRUST
+    assert abs(output.axes[1]) <= PARAMS.brake.tilt_rate * TICK + 1e-9
+
+
 def test_position_lost_brakes_on_velocity_then_releases():
     flight = flight_without_gps().hovering()
     flight.aircraft.airborne([0.0, 0.0, 5.0], [2.0, 0.0, 0.0])
@@ -511,6 +523,14 @@ def test_an_exception_does_not_outrank_the_pilot():
     flight = Flight(aircraft=airborne()).hovering()
     telemetry = dataclasses.replace(flight.log[-1][1].telemetry, rc=RcMode.P)
     assert flight.guard.give_way(flight.t, telemetry, ValueError()).axes is None
+
+
+def test_a_single_exception_on_the_ground_changes_nothing():
+    flight = Flight()
+    flight.run(1.0)
+    output = flight.guard.give_way(flight.t, flight.log[-1][1].telemetry, ValueError("boom"))
+    assert (output.mode, output.axes, output.actions) == (Mode.READY, None, ())
+    assert flight.tick().mode is Mode.READY
 
 
 def test_first_flights_command_vertical_velocity_instead_of_thrust():

@@ -224,7 +224,9 @@ PREFLIGHT = [
     ({"battery": 0.24}, "24 %, 25 % are needed"),
     ({"battery": math.nan}, "battery"),
     ({"gps_health": 3}, "GPS health is 3"),
-    ({"gps_age": 1.0}, "GPS health"),
+    ({"gps_age": 1.0}, "GPS health is 1.00 s old"),
+    ({"gps_age": math.inf, "gps_health": 0}, "GPS health is missing"),
+    ({"rc_age": math.inf, "rc": RcMode.UNKNOWN, "sticks": math.inf}, "RC is missing"),
     ({"verified_plans": 9, "plan_finding": "no plan has come"}, "9 of 10"),
 ]
 

@@ -13,7 +13,7 @@ def limit(axes, suffix="generic"):
     return limited(decode(suffix, axes), PRESET.flight_controller.limits, PRESET.tilt_limit)
 
 
-# The self-test vectors of dji_sdk.md, section 9.
+# The self-test vectors of uav_sim/doc/dji_sdk.md, section 9.
 @pytest.mark.parametrize(
     ("suffix", "axes", "expected"),
     [

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The numbers of DJI's interface: control bytes, setpoint axes, RC switch, flight status.
 
-Source: facts sheet of dji_sdk, sections 2 to 5. Degrees, percent and flags live here and nowhere
+Source: uav_sim/doc/dji_sdk.md, sections 2 to 5. Degrees, percent and flags live here and nowhere
 else. What leaves this module towards the aircraft is finite and inside the limits, or it does not
 leave: a setpoint that is not finite raises SetpointError.
 """
@@ -68,7 +68,7 @@ class Switch:
 
 @dataclass(frozen=True)
 class SetpointLimits:
-    """The narrower of DJI's two published tables for each setpoint (facts sheet, section 3.4)."""
+    """The narrower of DJI's two published tables for each setpoint (uav_sim/doc/dji_sdk.md 3.4)."""
 
     tilt: float = field(metadata={"min": 0.01, "max": 0.6109})  # [rad] norm of (roll, pitch)
     yaw_rate: float = field(metadata={"min": 0.0, "max": 2.618})  # [rad/s]

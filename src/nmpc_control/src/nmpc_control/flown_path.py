@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The way that was flown, bounded in size however long the flight lasts."""
 
+import math
 from typing import List, Optional, Tuple
 
 import numpy as np
@@ -28,9 +29,9 @@ class FlownPath:
         self._last: Optional[np.ndarray] = None
         self.start_clock(None)
 
-    def start_clock(self, t: Optional[float]) -> None:
-        """Count the labels from a time [s]; None: no labels."""
-        self._clock_start, self._period = t, self._first_period
+    def start_clock(self, t: Optional[float], duration: float = math.inf) -> None:
+        """Count the labels from a time [s] for a duration [s]; None: no labels."""
+        self._clock_start, self._duration, self._period = t, duration, self._first_period
         self.labels: List[Tuple[float, np.ndarray]] = []  # ([s] on the clock, (3,) [m])
 
     def add(self, t: float, position: np.ndarray) -> None:
@@ -52,7 +53,7 @@ class FlownPath:
     def _label(self, elapsed: float, position: np.ndarray) -> None:
         due = elapsed // self._period * self._period
         is_new = not self.labels or due > self.labels[-1][0]
-        if not is_new or elapsed - due > _LATEST:
+        if not is_new or elapsed - due > _LATEST or due > self._duration:
             return
         self.labels.append((due, position))
         if len(self.labels) > self._label_capacity:

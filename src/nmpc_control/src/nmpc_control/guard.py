@@ -92,7 +92,9 @@ class Guard:
         self._failures += 1
         reason = f"the guard itself failed: {type(error).__name__}: {error}"
         pilot = modes.pilot_has_control(telemetry, self.params.modes)
-        if self.mode in STREAMING and not pilot and self._failures <= MAX_FAILURES:
+        if self._failures <= MAX_FAILURES:
+            if self.mode not in STREAMING or pilot:
+                return GuardOutput(self.mode, Rung.NONE, reason)
             trusted = self._gps_holds(telemetry)
             axes = self._hold_axes() if trusted else self._axes(hover_input(), 0.0)[0]
             return GuardOutput(Mode.BRAKING, Rung.BRAKE_BLIND, reason, axes)
@@ -217,6 +219,7 @@ class Guard:
         if not seen.authority:
             return _Command(rung)
         if self._gps_holds(seen):
+            self._brake.begin(hover_input())  # where a brake of our own would have to go on from
             return _Command(rung, self._hold_axes())
         state = self._state_in_effect(i, has_velocity)
         u = self._brake.input(state, dt, has_position and has_velocity)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The M100's flight controller: authority, tasks, acceptance of setpoints, and flight without them.
 
-Follows dji_sdk.md sections 3.5, 4, 5 and 9; what that sheet marks as not verified is a parameter in
+Follows doc/dji_sdk.md sections 3.5, 4, 5, 9; what that page marks as open is a parameter in
 ``common.yaml``.
 """
 

@@ -27,7 +27,7 @@ class Guidance:
         x, y, plant = setpoint.x, setpoint.y, self._plant
         if is_angle:
             x, y = -math.radians(y), math.radians(x)  # tilt ahead or north, tilt right or east
-        # In the GROUND frame an angle, too, is relative to north and east (dji_sdk.md 3.3).
+        # In the GROUND frame an angle, too, is relative to north and east (doc/dji_sdk.md 3.3).
         east, north = (y, x) if setpoint.frame is Frame.GROUND else self._east_north(x, y)
         if is_angle and setpoint.frame is Frame.BODY:
             self._target = (y, x)

@@ -8,7 +8,7 @@ from typing import List, Union
 from uav_sim.config import config_directory, from_dict, load_yaml
 from uav_sim.errors import ConfigError
 
-PACKET_PERIOD = 0.01  # [s] between two packets of the M100's serial link (dji_sdk.md 2.1)
+PACKET_PERIOD = 0.01  # [s] between two packets of the M100's serial link (doc/dji_sdk.md 2.1)
 
 
 def _number(low: float = 0.0, high: float = math.inf) -> float:

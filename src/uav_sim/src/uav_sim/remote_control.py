@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The pilot's remote control as dji_sdk shows it (dji_sdk.md 2.4); it sits in F, sticks centred."""
+"""The pilot's remote control as dji_sdk shows it (doc/dji_sdk.md 2.4); in F, sticks centred."""
 
 from dataclasses import dataclass
 from typing import Tuple

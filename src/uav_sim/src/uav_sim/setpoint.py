@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Setpoints as dji_sdk hands them to the flight controller (dji_sdk.md 3).
+"""Setpoints as dji_sdk hands them to the flight controller (doc/dji_sdk.md 3).
 
 A decoded setpoint is in the flight controller's convention: degrees, forward-right or north-east,
 yaw clockwise from north, up positive.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What the M100's serial link brings to dji_sdk: packets at 100 Hz after the link's dead time.
 
-Order, rates, frames, units and signs follow dji_sdk.md section 2; a packet is stamped on receipt.
+Order, rates, frames, units, signs follow doc/dji_sdk.md section 2; a packet is stamped on receipt.
 """
 
 import math

@@ -44,7 +44,8 @@ def read_flight(
     path = Path(path)
     recording = reading.read(path, namespace, progress)
     missing = list(recording.remarks)
-    starts = _clock_starts(recording.events.get("trajectory", []))
+    trajectories = recording.events.get("trajectory", [])
+    starts = _clock_starts(trajectories)
     number = len(starts) if flight is None else flight
     if flight is not None and not 1 <= flight <= max(1, len(starts)):
         raise BagError(f"has {len(starts)} flights, expected at least {flight}")
@@ -56,7 +57,7 @@ def read_flight(
     return FlightRecord(
         bag=path.name,
         flight=(max(number, 1), max(len(starts), 1)),
-        scenario=start.content.name or None if start else None,
+        scenario=_name(start or (trajectories or [None])[-1]),
         source=_source(recording, missing),
         reference=start
         and Reference(start.stamp, Series(start.content.times, start.content.positions)),
@@ -67,11 +68,15 @@ def read_flight(
         status=status,
         airborne=airborne,
         automatic=automatic,
-        phase_end=_next_trajectory(recording.events.get("trajectory", []), start),
+        phase_end=_next_trajectory(trajectories, start),
         reported_collisions=_collisions(recording, automatic),
         missing=tuple(missing),
         **motion,
     )
+
+
+def _name(trajectory: Optional[Event]) -> Optional[str]:
+    return (trajectory.content.name or None) if trajectory else None
 
 
 def _clock_starts(trajectories: List[Event]) -> List[Event]:

@@ -59,6 +59,8 @@ def _imu(message: Any) -> Sequence[float]:
 def _setpoint(message: Any) -> Sequence[float]:
     """Return thrust [percent], roll, pitch [rad], yaw rate [rad/s]; NaN if the flag says other."""
     x, y, z, yaw, flag = (float(axis) for axis in message.axes[:5])
+    if not all(map(math.isfinite, (x, y, z, yaw, flag))):
+        raise ValueError("a setpoint that is not finite")
     bits = int(flag)
     is_angle, is_thrust, is_rate = bits & 0xC0 == 0x00, bits & 0x30 == 0x20, bool(bits & 0x08)
     return (

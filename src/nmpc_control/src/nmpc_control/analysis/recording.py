@@ -18,9 +18,8 @@ from nmpc_control.analysis.record import Series
 from nmpc_control.analysis.topics import ROLES, Selection, select
 from nmpc_control.errors import BagError
 
-Progress = Callable[
-    [Iterable[Any], int], Iterable[Any]
-]  # messages and their number to the same messages
+# From messages and their number to the same messages
+Progress = Callable[[Iterable[Any], int], Iterable[Any]]
 
 
 class Event(NamedTuple):
@@ -65,9 +64,7 @@ def read(
         raise
     except PermissionError:
         raise BagError("cannot be opened: permission denied") from None
-    except (
-        Exception
-    ) as error:  # on a damaged file the library raises whatever its parser stumbles over
+    except Exception as error:  # what the library's parser stumbles over in a damaged file
         raise BagError(f"not a readable ROS 1 bag: {_one_line(error)}") from None
 
 
@@ -94,9 +91,8 @@ def _read(reader: Reader, namespace: Optional[str], progress: Progress) -> Recor
 def _decoders(connections: List[Any], recording: Recording) -> Dict[int, Decode]:
     decoders: Dict[int, Decode] = {}
     for connection in connections:
-        definition = getattr(
-            connection.msgdef, "data", connection.msgdef
-        )  # plain text before rosbags 0.10
+        msgdef = connection.msgdef  # text itself in rosbags 0.9
+        definition = getattr(msgdef, "data", msgdef)
         try:
             decoders[connection.id] = decoder(connection.msgtype, definition)
         except BagError as error:
@@ -126,9 +122,7 @@ class _Collector:
                 self._events.setdefault(role, []).append(event)
                 return
             row = [float(value) for value in ROWS[role][1](message)]
-        except (
-            Exception
-        ):  # an untrusted message with any content, decoded by an untrusted definition
+        except Exception:  # untrusted content, decoded by an untrusted definition
             self._unusable[role] = self._unusable.get(role, 0) + 1
             return
         times, values = self._numbers.setdefault(role, (array("d"), array("d")))
@@ -138,11 +132,7 @@ class _Collector:
     def finish(self, recording: Recording) -> None:
         for role, (times, values) in self._numbers.items():
             table = np.array(values).reshape(len(times), ROWS[role][0])
-            finite = (
-                np.ones(len(table), bool)
-                if role in NAN_MEANS_ABSENT
-                else np.isfinite(table).all(axis=1)
-            )
+            finite = np.isfinite(table).all(axis=1) | (role in NAN_MEANS_ABSENT)
             if not finite.all():
                 recording.remarks.append(
                     f"{_name(role)}: {np.sum(~finite)} samples are not finite: left out"

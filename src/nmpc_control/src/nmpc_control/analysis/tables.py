@@ -46,7 +46,10 @@ def sections(flights: Sequence[Metrics]) -> List[Section]:
         "Tilt, mean and maximum [rad]": _mean_and_maximum("tilt_rad"),
         "Command rate [Hz]": _number("command_rate_hz", 2),
         "Longest gap between commands [ms]": _number("command_gap_ms_max", 1),
+        "Plans rejected by the guard": _text("plans_rejected"),
+        "Deadlines missed by the controller": _text("deadline_misses"),
         "Collisions": _text("collisions"),
+        "Hull, centre to propeller tip [m]": _number("vehicle_radius_m", 2),
     }
     return [
         ("Simulation (paper, table 1)", _rows(simulation, flights)),

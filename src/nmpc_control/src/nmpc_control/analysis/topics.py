@@ -63,10 +63,9 @@ def select(connections: Sequence[Any], namespace: Optional[str] = None) -> Selec
         names = ", ".join(sorted(prefix or "/" for prefix in vehicles))
         remarks.append(f"topics of several vehicles ({names}): evaluated {chosen or '/'}")
     found = vehicles.get(chosen, {})
-    if "setpoint" not in found and commands:
-        found["mav_command"] = max(
-            commands.values(), key=lambda group: sum(c.msgcount for c in group)
-        )
+    own = [group for topic, group in commands.items() if topic.startswith(chosen + "/")]
+    if "setpoint" not in found and own:
+        found["mav_command"] = max(own, key=lambda group: sum(c.msgcount for c in group))
     is_simulation = any("uav_sim" in connection.topic.split("/") for connection in connections)
     return Selection(chosen, found, is_simulation, tuple(remarks))
 

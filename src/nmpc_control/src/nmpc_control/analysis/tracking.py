@@ -80,7 +80,9 @@ def _retimed_figures(record: FlightRecord, window: Optional[Window], missing: Li
     """Return the deviation to what the controller compared with, slowed or re-timed as it was."""
     tracked, position = record.tracked_reference, record.position
     if tracked is None or position is None or window is None or not len(position):
-        missing.append("no reference or position of the controller: no deviation between the two")
+        missing.append(
+            "what the controller compared with is not known: no deviation from a re-timed reference"
+        )
         return _deviation_figures(None, "_retimed")
     start, end = max(window.start, position.times[0]), min(window.reference_end, position.times[-1])
     tracked = tracked.between(start, end)

@@ -30,7 +30,7 @@ from nmpc_control.controller import Controller
 from nmpc_control.errors import NmpcError
 
 from nmpc_control.params import Parameters, load_parameters, load_weights
-from nmpc_control.ros.conversions import obstacles_from_msg
+from nmpc_control.ros.conversions import MessageError, obstacles_from_msg
 from nmpc_control.ros.publishers import Publishers
 from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
 from nmpc_control.rotations import rpy_from_quaternion
@@ -58,6 +58,7 @@ class ControllerNode:
         self._inputs: Deque[Tuple[float, Tuple[float, ...]]] = deque(maxlen=200)
         self._requests: "queue.Queue[Callable[[float], None]]" = queue.Queue(maxsize=20)
         self._heard: Dict[str, Obstacle] = {}
+        self._new_obstacles: Optional[Sequence[Obstacle]] = None
         self.publishers = Publishers(self.frame_id, rospy.get_param("~base_frame", "base_link"))
         self.action = TrajectoryAction(
             on_goal=lambda: self._request(self._accept_goal),
@@ -99,6 +100,10 @@ class ControllerNode:
             self.controller.record_input(sent, np.array(u))
         while not self._requests.empty():
             self._requests.get_nowait()(t)
+        if self._new_obstacles is not None:
+            self._heard = {obstacle.id: obstacle for obstacle in self._new_obstacles}
+            self._new_obstacles = None
+            self._join_obstacles()
         pursued = self.controller.itinerary.goal is not Goal.HOLD
         clock_start = self.controller.itinerary.clock_start
         step = self.controller.step(t)
@@ -179,10 +184,6 @@ class ControllerNode:
         self.controller.obstacles = tuple(joined.values())
         self.publishers.obstacles(self.controller.obstacles)
 
-    def _take_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
-        self._heard = {obstacle.id: obstacle for obstacle in obstacles}
-        self._join_obstacles()
-
     def _subscribe(self) -> None:
         def listen(topic: str, kind: type, callback: Callable, queue_size: int = 1) -> None:
             rospy.Subscriber(topic, kind, callback, queue_size=queue_size, tcp_nodelay=True)
@@ -208,8 +209,10 @@ class ControllerNode:
                 self._inputs.append((m.header.stamp.to_sec(), u))
 
         def on_obstacles(m: ObstacleArray) -> None:
-            obstacles = obstacles_from_msg(m)
-            self._request(lambda t: self._take_obstacles(obstacles))
+            try:
+                self._new_obstacles = obstacles_from_msg(m, self.frame_id)
+            except MessageError as error:
+                rospy.logwarn_throttle(1.0, f"obstacles refused: {error}")
 
         listen("dji_sdk/attitude", QuaternionStamped, on_attitude)
         listen("dji_sdk/imu", Imu, on_imu)

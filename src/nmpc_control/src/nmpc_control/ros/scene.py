@@ -43,8 +43,9 @@ class Scene:
 
     def set_trajectory(self, message: MultiDOFJointTrajectory) -> None:
         """Show the whole reference; a stamp of 0 announces a flight, any other starts its clock."""
-        if message.header.stamp.to_sec() > 0.0:
-            self._path.start_clock(message.header.stamp.to_sec())
+        if message.header.stamp.to_sec() > 0.0 and message.points:
+            duration = message.points[-1].time_from_start.to_sec()
+            self._path.start_clock(message.header.stamp.to_sec(), duration)
         else:
             self._path.clear()
             self._true_path.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Packets, truth and obstacles as ROS messages, filled as dji_sdk does (dji_sdk.md 2.2)."""
+"""Packets, truth and obstacles as ROS messages, filled as dji_sdk does (doc/dji_sdk.md 2.2)."""
 
 import math
 from typing import Any, Callable, Dict, NamedTuple, Sequence, Tuple

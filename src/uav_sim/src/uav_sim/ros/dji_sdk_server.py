@@ -28,11 +28,11 @@ from uav_sim.ros.conversions import TELEMETRY
 from uav_sim.setpoint import FLAGS, TOPIC_PREFIX
 from uav_sim.telemetry import Packet
 
-QUEUE = 10  # of every publisher and subscriber of dji_sdk (dji_sdk.md 1)
+QUEUE = 10  # of every publisher and subscriber of dji_sdk (doc/dji_sdk.md 1)
 LATCHED = "local_frame_ref"
-FIRMWARE = 0x03010A00  # 3.1.10.0, an M100's (dji_sdk.md 4)
+FIRMWARE = 0x03010A00  # 3.1.10.0, an M100's (doc/dji_sdk.md 4)
 
-# Advertised on an M100, but no message ever comes (dji_sdk.md 2.2). The NMEA sentence of the time
+# Advertised on an M100, but no message ever comes (doc/dji_sdk.md 2.2). The NMEA sentence of time
 # synchronisation is left out: its message package is no part of this workspace.
 SILENT = {
     "vo_position": VOPosition,

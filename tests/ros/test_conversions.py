@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: MIT
+"""What goes through messages comes back the same, and what cannot be right is refused in words."""
+
+import math
+from io import BytesIO
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("nmpc_msgs", reason="the workspace is not built or not sourced")
+
+import rospy
+from std_msgs.msg import Header
+
+from nmpc_control.ros.conversions import (
+    MessageError,
+    obstacles_from_msg,
+    obstacles_to_msg,
+    odometry_to_msg,
+    plan_from_msg,
+    plan_to_msg,
+    prediction_to_msg,
+)
+from nmpc_control.rotations import rpy_from_quaternion
+from nmpc_control.state import Goal, Obstacle, Plan
+
+STAMP = rospy.Time(12, 500_000_000)
+HEADER = Header(stamp=STAMP, frame_id="world")
+
+
+@pytest.fixture
+def step():
+    rng = np.random.default_rng(1)
+    plan = Plan(
+        t=STAMP.to_sec(),
+        dt=0.1,
+        delay=0.14,
+        states=rng.normal(size=(4, 10)),
+        inputs=rng.normal(size=(3, 4)),
+        status="converged",
+        iterations=2,
+        solve_time=0.003,
+        cost=1.5,
+        kkt_residual=1e-4,
+    )
+    return SimpleNamespace(
+        plan=plan,
+        goal=Goal.TRAJECTORY,
+        stage_references=rng.normal(size=(4, 10)),
+        reference_time=3.5,
+        predicted_clearance=0.7,
+    )
+
+
+def over_the_wire(message):
+    """Return the message after being written and read as bytes."""
+    buffer = BytesIO()
+    message.serialize(buffer)
+    return type(message)().deserialize(buffer.getvalue())
+
+
+def test_a_plan_comes_back_the_same(step):
+    message = over_the_wire(plan_to_msg(step, HEADER, 4))
+    plan, goal = plan_from_msg(message, "world")
+    assert goal is Goal.TRAJECTORY
+    np.testing.assert_array_equal(plan.states, step.plan.states)
+    np.testing.assert_array_equal(plan.inputs, step.plan.inputs)
+    for name in (
+        "t",
+        "dt",
+        "delay",
+        "found",
+        "status",
+        "iterations",
+        "solve_time",
+        "cost",
+        "kkt_residual",
+    ):
+        assert getattr(plan, name) == getattr(step.plan, name)
+    np.testing.assert_array_equal(
+        np.reshape(message.references, (4, 3)), step.stage_references[:, :3]
+    )
+    assert (message.reference_time, message.deadline_misses) == (3.5, 4)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"horizon": 4}, "40 states and 12 inputs for a horizon of 4"),
+        ({"horizon": 0}, "horizon of 0"),
+        ({"horizon": 4_000_000_000}, "expected 1 to 1000"),
+        ({"states": [0.0] * 39}, "39 states"),
+        ({"inputs": []}, "0 inputs"),
+        ({"goal": 7}, "unknown goal 7"),
+        ({"header": Header(frame_id="map")}, "frame 'map', expected 'world'"),
+    ],
+)
+def test_plans_that_cannot_be_right_are_refused(step, change, words):
+    message = plan_to_msg(step, HEADER, 0)
+    for name, value in change.items():
+        setattr(message, name, value)
+    with pytest.raises(MessageError, match=words):
+        plan_from_msg(message, "world")
+
+
+def test_a_prediction_has_one_entry_for_each_stage(step):
+    message = over_the_wire(prediction_to_msg(step, HEADER))
+    counts = [len(a) for a in (message.stamps, message.poses, message.twists, message.references)]
+    assert counts == [4, 4, 4, 4]
+    assert len(message.inputs) == 3
+    times = [stamp.to_sec() for stamp in message.stamps]
+    assert times == pytest.approx(12.5 + 0.14 + 0.1 * np.arange(4))
+
+
+def test_odometry_has_its_twist_in_body_axes():
+    roll, pitch, yaw, yaw_rate = 0.2, -0.3, 2.0, 0.7
+    velocity = np.array([1.0, -2.0, 0.5])
+    x = np.array([1.0, 2.0, 3.0, roll, pitch, yaw, *velocity, yaw_rate])
+    message = odometry_to_msg(x, HEADER, "base_link")
+    q = message.pose.pose.orientation
+    assert rpy_from_quaternion([q.x, q.y, q.z, q.w]) == pytest.approx((roll, pitch, yaw))
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
+    R_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    R_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    R_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    R_world_body = R_z @ R_y @ R_x
+    linear, angular = message.twist.twist.linear, message.twist.twist.angular
+    assert [linear.x, linear.y, linear.z] == pytest.approx(R_world_body.T @ velocity)
+    turning = R_world_body.T @ [0.0, 0.0, yaw_rate]
+    assert [angular.x, angular.y, angular.z] == pytest.approx(turning)
+    assert message.child_frame_id == "base_link"
+
+
+def test_obstacles_come_back_the_same_and_moving_ones_where_they_are_by_then():
+    ball = Obstacle("ball", np.array([1.0, 2.0, 3.0]), np.array([0.5]))
+    moving = Obstacle(
+        "bird", np.zeros(3), np.array([1.0, 2.0]), "cylinder", np.array([1.0, 0.0, 0.0]), 10.5
+    )
+    box = Obstacle("box", np.ones(3), np.array([1.0, 2.0, 3.0]), "box")
+    message = over_the_wire(obstacles_to_msg([ball, moving, box], HEADER))
+    back = obstacles_from_msg(message, "world")
+    assert [o.id for o in back] == ["ball", "bird", "box"]
+    assert [o.shape for o in back] == ["sphere", "cylinder", "box"]
+    assert [o.stamp for o in back] == [None, 12.5, None]
+    np.testing.assert_array_equal(back[1].position, [2.0, 0.0, 0.0])
+    for one, other in zip((ball, moving, box), back):
+        np.testing.assert_array_equal(one.size, other.size)
+        np.testing.assert_allclose(one.position_at(20.0), other.position_at(20.0))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"size": [-1.0]}, "expected 1 positive number"),
+        ({"size": [math.nan]}, "expected 1 positive number"),
+        ({"size": []}, "expected 1 positive number"),
+        ({"shape": 9}, "unknown shape 9"),
+        ({"position.x": math.inf}, "not finite"),
+        ({"velocity.z": math.nan}, "not finite"),
+    ],
+)
+def test_an_impossible_obstacle_refuses_the_message(change, words):
+    ball = Obstacle("ball", np.zeros(3), np.array([0.5]))
+    message = obstacles_to_msg([ball], HEADER)
+    for name, value in change.items():
+        *path, last = name.split(".")
+        target = message.obstacles[0]
+        for part in path:
+            target = getattr(target, part)
+        setattr(target, last, value)
+    with pytest.raises(MessageError, match=words):
+        obstacles_from_msg(message)
+
+
+def test_a_flood_another_frame_and_motion_without_time_are_refused():
+    ball = Obstacle("ball", np.zeros(3), np.array([0.5]))
+    with pytest.raises(MessageError, match="257 obstacles"):
+        obstacles_from_msg(obstacles_to_msg([ball] * 257, HEADER))
+    with pytest.raises(MessageError, match="frame 'world', expected 'map'"):
+        obstacles_from_msg(obstacles_to_msg([ball], HEADER), "map")
+    message = obstacles_to_msg([ball], Header(frame_id="world"))
+    message.obstacles[0].velocity.x = 1.0
+    with pytest.raises(MessageError, match="has no stamp"):
+        obstacles_from_msg(message)

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""Bags whose messages are odd: not finite, out of order, of another type or another meaning."""
+
+import numpy as np
+import pytest
+from analysis_bags import FLYING, BagBuilder, Flight
+
+from nmpc_control.analysis.bag import read_flight
+from nmpc_control.analysis.metrics import flight_metrics
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return Flight().build()
+
+
+@pytest.fixture(scope="module")
+def bag(flight, tmp_path_factory):
+    return flight.write(tmp_path_factory.mktemp("bags") / "line.bag")
+
+
+@pytest.fixture(scope="module")
+def metrics(bag):
+    return flight_metrics(read_flight(bag))
+
+
+def test_samples_that_are_not_finite_are_left_out_and_counted(flight, metrics, tmp_path):
+    builder = flight.without("nothing")
+    for k in range(7):
+        bad = (np.nan, 0.0, 0.0) if k % 2 else (0.0, np.inf, 0.0)
+        builder.odometry("nmpc/odometry", 111.001 + k, bad, (0.0, 0.0, 0.0))
+    builder.plan(115.0, 1000, np.nan)
+    figures = flight_metrics(read_flight(builder.write(tmp_path / "nan.bag")))
+    assert figures["average_deviation_m"] == pytest.approx(0.25, abs=1e-9)
+    assert figures["solver_iterations_mean"] == metrics["solver_iterations_mean"]
+    assert figures["missing"] == [
+        "nmpc/odometry: 7 samples are not finite: left out",
+        "nmpc/plan: 1 samples are not finite: left out",
+    ]
+
+
+def test_stamps_out_of_order_are_sorted(flight, metrics, tmp_path):
+    builder = BagBuilder()
+    order = np.random.default_rng(0).permutation(len(flight.messages))
+    recorded = sorted(m[2] for m in flight.messages)
+    shuffled = [flight.messages[i] for i in order]
+    stamped = [m for m in shuffled if not m[0].endswith(("flight_status", "nmpc/trajectory"))]
+    rest = [m for m in shuffled if m[0].endswith(("flight_status", "nmpc/trajectory"))]
+    builder.messages = [(a, b, t, v) for (a, b, _, v), t in zip(stamped, recorded)] + rest
+    figures = flight_metrics(read_flight(builder.write(tmp_path / "shuffled.bag")))
+    for key in ("average_deviation_m", "command_gap_ms_max", "navigation_time_s", "total_time_s"):
+        assert figures[key] == pytest.approx(metrics[key], abs=1e-6), key
+
+
+def test_meaning_of_a_setpoint_is_in_its_flag(tmp_path):
+    builder = BagBuilder()
+    for k in range(100):
+        builder.status(100.0 + 0.02 * k, FLYING)
+    builder.setpoint(100.0, 0.1, 0.2, 37.0, 0.3, flag=0x2B)
+    builder.setpoint(100.5, 9.0, 9.0, 99.0, 9.0, flag=0x49)  # velocities
+    builder.setpoint(101.0, 0.4, 0.5, 88.0, 0.6, flag=0x0B)  # attitude and vertical velocity
+    record = read_flight(builder.write(tmp_path / "flags.bag"))
+    expected = [[37.0, 0.1, 0.2, 0.3], [np.nan, np.nan, np.nan, 9.0], [np.nan, 0.4, 0.5, 0.6]]
+    np.testing.assert_allclose(record.commands.values, expected, atol=1e-6)
+    figures = flight_metrics(record)
+    assert figures["thrust_percent"] == pytest.approx([37.0, 37.0])
+    assert figures["command_gap_ms_max"] == pytest.approx(500.0, abs=1e-3)
+
+
+def test_setpoints_without_meaning_are_counted(flight, tmp_path):
+    builder = flight.without("nothing")
+    topic = "dji_sdk/flight_control_setpoint_generic"
+    for axes in ([0.1, 0.2], [0.0, np.nan, 38.0, 0.0, 43.0]):
+        builder.add(topic, "sensor_msgs/msg/Joy", 112.0, {"axes": axes})
+    missing = read_flight(builder.write(tmp_path / "short.bag")).missing
+    assert missing == (f"{topic}: 2 messages cannot be used: left out",)
+
+
+def test_trajectory_whose_clock_never_started_is_named(flight, tmp_path):
+    builder = flight.without("nmpc/trajectory")
+    builder.trajectory(106.0, 0.0, "never", [0.0, 1.0], [[0, 0, 2], [1, 0, 2]])
+    figures = flight_metrics(read_flight(builder.write(tmp_path / "never.bag")))
+    assert figures["scenario"] == "never"
+    assert figures["average_deviation_m"] is None
+
+
+def test_unusable_trajectory_and_obstacles_are_counted(flight, tmp_path):
+    builder = flight.without("nmpc/trajectory", "nmpc/obstacles")
+    builder.trajectory(106.0, 110.0, "bad", [0.0, 1.0], [[0, 0, 2], [np.nan, 0, 2]])
+    builder.obstacles(98.0, [("ball", (0.0, 0.0, np.inf), 0.5)])
+    builder.obstacles(99.0, [("ball", (0.0, 0.0, 0.0), -0.5)])
+    figures = flight_metrics(read_flight(builder.write(tmp_path / "bad.bag")))
+    assert "nmpc/trajectory: 1 messages cannot be used: left out" in figures["missing"]
+    assert "nmpc/obstacles: 2 messages cannot be used: left out" in figures["missing"]
+    assert figures["clearance_m"] is None
+
+
+def test_topic_of_another_type_is_named(flight, tmp_path):
+    builder = flight.without("nmpc/plan")
+    builder.add("nmpc/plan", "std_msgs/msg/String", 100.0, {"data": "plan"})
+    figures = flight_metrics(read_flight(builder.write(tmp_path / "type.bag")))
+    assert "/nmpc/plan has type std_msgs/msg/String: not read" in figures["missing"]
+    assert figures["solver_iterations_mean"] is None

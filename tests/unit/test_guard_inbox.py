@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: MIT
+"""What was heard reaches exactly one tick, with its age."""
+
+import math
+
+import numpy as np
+import pytest
+from flight_stub import PARAMS, make_plan
+
+from nmpc_control.dji import FlightStatus, RcMode
+from nmpc_control.guard_inbox import GuardInbox
+from nmpc_control.mode_inputs import Request
+from nmpc_control.state import Goal, hover_state
+
+
+@pytest.fixture
+def inbox():
+    return GuardInbox(PARAMS)
+
+
+def test_nothing_heard_is_infinitely_old(inbox):
+    telemetry = inbox.inputs(10.0).telemetry
+    ages = ("attitude", "velocity", "position", "rc", "status", "gps", "battery")
+    assert [getattr(telemetry, f"{name}_age") for name in ages] == [math.inf] * 7
+    assert telemetry.rc is RcMode.UNKNOWN
+    assert telemetry.flight_status is FlightStatus.UNKNOWN
+
+
+def test_telemetry_is_read_with_its_age(inbox):
+    inbox.add_rc(9.9, [0.0, 0.2, 0.0, 0.0, 8000.0, -4545.0])
+    inbox.add_flight_status(9.8, 3)
+    inbox.add_gps_health(9.7, 5)
+    inbox.add_battery(9.0, 80.0)
+    inbox.add_height(1.5)
+    inputs = inbox.inputs(10.0)
+    telemetry = inputs.telemetry
+    assert (telemetry.rc, telemetry.sticks) == (RcMode.F, 0.2)
+    assert (telemetry.flight_status, telemetry.gps_health) == (FlightStatus.IN_AIR, 5)
+    assert telemetry.battery == pytest.approx(0.8)
+    ages = telemetry.rc_age, telemetry.status_age, telemetry.gps_age, telemetry.battery_age
+    assert ages == pytest.approx((0.1, 0.2, 0.3, 1.0))
+    assert inputs.height == 1.5
+
+
+def test_plan_request_and_failure_reach_one_tick_only(inbox):
+    plan = make_plan(hover_state(np.zeros(3)), 10.0)
+    inbox.add_plan(plan, Goal.APPROACH)
+    inbox.add_plan_error("too short")
+    inbox.request, inbox.failure = Request.START, "refused"
+    first, second = inbox.inputs(10.0), inbox.inputs(10.02)
+    assert first.plan is plan
+    assert (first.goal, first.plan_error) == (Goal.APPROACH, "too short")
+    assert (first.telemetry.request, first.telemetry.failure) == (Request.START, "refused")
+    assert (second.plan, second.plan_error) == (None, "")
+    assert (second.telemetry.request, second.telemetry.failure) == (None, "")
