@@ -94,7 +94,8 @@ def test_both_backends_fly_the_same_way():
     figures = {}
     for backend in ("compiled", "ipopt"):
         parameters = load_parameters("dji_hil", scenario.weights)
-        solver = dataclasses.replace(parameters.solver, backend=backend, tolerance=1e-6, time_budget=1.0)
+        solver = dataclasses.replace(parameters.solver, backend=backend)
+        solver = solver.with_budget(tolerance=1e-6, time_budget=1.0, rate=10.0)
         figures[backend] = simulate(scenario, dataclasses.replace(parameters, solver=solver), "dji_hil")
     assert figures["ipopt"]["arrived"]
     assert figures["compiled"]["average_deviation_m"] == pytest.approx(

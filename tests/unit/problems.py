@@ -15,7 +15,8 @@ SPHERE = Obstacle("sphere", np.array([4.0, 0.3, 5.2]), np.array([0.6]))
 def parameters(backend: str, **solver: object) -> Parameters:
     """Return the default parameters with another backend and solver options."""
     base = load_parameters()
-    return dataclasses.replace(base, solver=dataclasses.replace(base.solver, backend=backend, **solver))
+    chosen = dataclasses.replace(base.solver, backend=backend)
+    return dataclasses.replace(base, solver=chosen.with_budget(**solver))
 
 
 def tight(backend: str) -> Nmpc:

@@ -23,7 +23,7 @@ class Nmpc:
         self.structure = Structure(p.horizon, p.dt, p.integrator, p.obstacle_slots)
         backend = SqpSolver if p.backend == "compiled" else IpoptSolver
         self.solver: Union[SqpSolver, IpoptSolver] = backend(
-            self.structure, p.tolerance, p.max_iterations, p.time_budget
+            self.structure, p.budget.tolerance, p.budget.max_iterations, p.budget.time_budget
         )
         self._last: Optional[Solution] = None
         self._last_t = 0.0

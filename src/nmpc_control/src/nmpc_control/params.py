@@ -109,24 +109,41 @@ class Avoidance:
 
 
 @dataclass(frozen=True)
+class Budget:
+    """How often a backend solves, and when a solve ends."""
+
+    rate: float = _positive()  # [Hz] solves per second
+    max_iterations: int = field(metadata={"min": 1, "max": 1000})
+    time_budget: float = _positive()  # [s] wall time for one solve
+    tolerance: float = _positive()  # of optimality, and [m], [m/s] of softened bounds
+
+
+@dataclass(frozen=True)
 class Solver:
-    """Which backend solves the problem, and when it stops."""
+    """Which backend solves the problem, its structure and its budget."""
 
     backend: str = field(metadata={"choices": ("compiled", "ipopt")})
     integrator: str = field(metadata={"choices": ("exact_lag", "rk4", "euler")})
     horizon: int = field(metadata={"min": 2, "max": 1000})  # N, number of stages
     dt: float = _positive()  # [s]
     obstacle_slots: int = field(metadata={"min": 0, "max": 256})
-    max_iterations: int = field(metadata={"min": 1, "max": 1000})
-    time_budget: float = _positive()  # [s] wall time for one solve
-    tolerance: float = _positive()  # norm of the projected gradient at which the solution counts as exact
+    compiled: Budget
+    ipopt: Budget
+
+    @property
+    def budget(self) -> Budget:
+        """Budget of the backend that is used."""
+        return self.compiled if self.backend == "compiled" else self.ipopt
+
+    def with_budget(self, **changes: float) -> "Solver":
+        """Return the same solver with parts of the used backend's budget changed."""
+        return replace(self, **{self.backend: replace(self.budget, **changes)})
 
 
 @dataclass(frozen=True)
 class Flight:
     """How the controller moves between trajectories."""
 
-    rate: float = _positive()  # [Hz] solves per second
     approach_speed: float = _positive()  # [m/s] on the way to the start of a trajectory
     approach_acceleration: float = _positive()  # [m/s^2]
     arrival_distance: float = _positive()  # [m]

@@ -32,7 +32,7 @@ class Solution:
     kkt_residual: float  # largest projected gradient, scaled by the input ranges
     active_bounds: int
     solve_time: float  # [s] wall time
-    violation: float = 0.0  # [m], [m/s] or fraction of an input's range: most by which a softened bound is exceeded
+    violation: float = 0.0  # [m] or [m/s] by which a softened bound is exceeded most
     softened: str = ""  # which kind of bound that is; empty while all hold
     gains: Optional[np.ndarray] = None  # (N, 4, 14) feedback on state and previous input
     multipliers: Optional[np.ndarray] = None  # (N + 1, nc) of the softened inequalities

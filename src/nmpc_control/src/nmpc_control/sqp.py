@@ -29,7 +29,7 @@ _LEAST_PIVOT = 1e-6
 _SHORTEST_STEP = 1.0 / 64.0
 _DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
 _DECREASE = 1e-3  # times tolerance: a smaller predicted change of the cost, relative, counts as none
-_EXCESS = 1e-3  # [m], [m/s], [1] by which a softened bound may be exceeded at convergence
+_SHOWN = 2e-3  # [m], [m/s] by which a softened bound must be exceeded to be reported
 _FIRST_ACCURACY = 1e-3  # predicted relative change of the cost at which the multipliers are first updated
 _ROUNDING = 1e-9  # a smaller predicted change, relative, is rounding
 
@@ -67,10 +67,10 @@ class SqpSolver:
             slope, residual, active = self._direction(damping, newton)
             if residual <= self.tolerance or -slope <= accuracy * (1.0 + abs(cost)):
                 moved = self._update_multipliers(instance.soft_weight)
-                if moved <= _EXCESS and (residual <= self.tolerance or accuracy <= final):
+                if moved <= self.tolerance and (residual <= self.tolerance or accuracy <= final):
                     status = "converged"
                     break
-                accuracy = final if moved <= _EXCESS else max(final, accuracy / 10.0)
+                accuracy = final if moved <= self.tolerance else max(final, accuracy / 10.0)
                 if moved > 0.0:
                     cost = self._evaluate()
                     slope, residual, active = self._direction(damping, newton)
@@ -87,13 +87,13 @@ class SqpSolver:
                 break
             else:
                 damping, newton = max(damping * _DAMPING_FACTOR, _DAMPING_FIRST), False
-        violation, softened = worst_violation(self._inequalities.T, self._kinds, _EXCESS)
+        violation, softened = worst_violation(self._inequalities.T, self._kinds, _SHOWN)
         return Solution(
             found=bool(np.isfinite(cost)),
             status=status,
             states=a["X"].T.copy(),
             inputs=a["U"].T.copy(),
-            cost=float(cost),
+            cost=self._objective(cost, instance.soft_weight),
             iterations=iterations,
             kkt_residual=float(residual),
             active_bounds=int(active),
@@ -127,6 +127,12 @@ class SqpSolver:
         self._arrays["alpha"][0, 0] = 0.0
         self._forward()
         return float(self._arrays["cost"][0, 0])
+
+    def _objective(self, augmented: float, weight: float) -> float:
+        """Return the problem's own cost: tracking and potentials plus the L1 penalty on the inequalities."""
+        g, mu = self._inequalities, self._curvature
+        excess = np.maximum(0.0, g + self._arrays["multipliers"] / mu)
+        return float(augmented - np.sum(mu / 2 * excess**2) + weight * np.sum(np.maximum(0.0, g)))
 
     def _update_multipliers(self, weight: float) -> float:
         """Move the multipliers by the inequalities at the iterate; returns the largest move, as an excess."""

@@ -71,8 +71,8 @@ class ControllerNode:
         """Solve at the controller's rate until shutdown; a failed tick is reported and the next one tried."""
         self.action.start()
         self._subscribe()
-        rate = rospy.Rate(self.parameters.flight.rate)
-        period = 1.0 / self.parameters.flight.rate
+        rate = rospy.Rate(self.parameters.solver.budget.rate)
+        period = 1.0 / self.parameters.solver.budget.rate
         misses, last = 0, None
         while not rospy.is_shutdown():
             now = rospy.Time.now()

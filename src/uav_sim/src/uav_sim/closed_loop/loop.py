@@ -50,7 +50,7 @@ class ClosedLoop:
         self.inbox = GuardInbox(guard_parameters)
         self.log = Log()
         self._ticks = _every(1.0 / guard_parameters.rate, preset.step)
-        self._solves = _every(1.0 / parameters.flight.rate, preset.step)
+        self._solves = _every(1.0 / parameters.solver.budget.rate, preset.step)
         self._count = 0
 
     @property
