@@ -1,4 +1,4 @@
-"""Flights without ROS: every scenario on both plants, the paper's table like for like, and a twin that must collide."""
+"""Flights without ROS, the paper's table like for like, and a twin that must collide."""
 
 import dataclasses
 import json
@@ -75,7 +75,10 @@ def test_multi_obstacle_like_for_like_with_the_papers_table(tmp_path):
 
 @pytest.mark.parametrize("plant", PLANTS)
 def test_without_avoidance_the_aircraft_collides(plant):
-    """Twin of multi_obstacle: neither the problem nor the guard knows the spheres, so the gates can fail."""
+    """Twin of multi_obstacle.
+
+    Neither the problem nor the guard knows the spheres, so the gates can fail.
+    """
     scenario = load_scenario("multi_obstacle")
     loop = new_loop(scenario, load_parameters(plant, scenario.weights), plant)
     fly(dataclasses.replace(scenario, obstacles=()), loop)
@@ -83,7 +86,10 @@ def test_without_avoidance_the_aircraft_collides(plant):
 
 
 def test_the_guard_alone_does_not_let_a_blind_plan_hit_a_sphere(tmp_path):
-    """Avoidance off in the problem, but the guard knows the spheres: it brakes, and nothing is hit."""
+    """Avoidance off in the problem, but the guard knows the spheres.
+
+    It brakes, and nothing is hit.
+    """
     _, metrics = run(tmp_path, "multi_obstacle", "--avoidance", "off")
     assert metrics["collisions"] == 0
     assert metrics["plans_rejected"] > 0
@@ -96,7 +102,9 @@ def test_both_backends_fly_the_same_way():
         parameters = load_parameters("dji_hil", scenario.weights)
         solver = dataclasses.replace(parameters.solver, backend=backend)
         solver = solver.with_budget(tolerance=1e-6, time_budget=1.0, rate=10.0)
-        figures[backend] = simulate(scenario, dataclasses.replace(parameters, solver=solver), "dji_hil")
+        figures[backend] = simulate(
+            scenario, dataclasses.replace(parameters, solver=solver), "dji_hil"
+        )
     assert figures["ipopt"]["arrived"]
     assert figures["compiled"]["average_deviation_m"] == pytest.approx(
         figures["ipopt"]["average_deviation_m"], abs=0.005
@@ -137,7 +145,10 @@ def test_bad_input_ends_in_one_line_and_status_two(capsys, arguments, words):
         ("reference: {type: hold}\n", "duration"),
         ("speed: .nan\nreference: {type: waypoints, points: [[0,0,2],[1,0,2]]}\n", "speed"),
         ("speed: 1.0\nreference: {type: waypoints, points: [[0,0,2]]}\n", "points"),
-        ("speed: 1.0\nspede: 2\nreference: {type: waypoints, points: [[0,0,2],[1,0,2]]}\n", "spede"),
+        (
+            "speed: 1.0\nspede: 2\nreference: {type: waypoints, points: [[0,0,2],[1,0,2]]}\n",
+            "spede",
+        ),
         (
             "speed: 1.0\nreference: {type: waypoints, points: [[0,0,2],[1,0,2]]}\n"
             "obstacles: [{id: a, position: [5,0,2], radius: -1}]\n",
@@ -150,7 +161,15 @@ def test_bad_input_ends_in_one_line_and_status_two(capsys, arguments, words):
         ),
         ("speed: 1.0\nreference: [unclosed\n", "line"),
     ],
-    ids=["missing key", "NaN", "one waypoint", "unknown key", "negative radius", "start in obstacle", "syntax"],
+    ids=[
+        "missing key",
+        "NaN",
+        "one waypoint",
+        "unknown key",
+        "negative radius",
+        "start in obstacle",
+        "syntax",
+    ],
 )
 def test_bad_scenario_files_end_in_one_line_and_status_two(tmp_path, capsys, text, words):
     path = tmp_path / "mine.yaml"
@@ -165,7 +184,7 @@ def test_bad_scenario_files_end_in_one_line_and_status_two(tmp_path, capsys, tex
 
 
 def test_clearance_of_log_and_simulator_agree(tmp_path):
-    """The offline figure from samples and the simulator's own record are two computations of one distance."""
+    """Two computations of one distance: offline from samples, and in the simulator."""
     _, metrics = run(tmp_path, "one_obstacle")
     for name, clearance in metrics["clearance_m"].items():
         assert clearance == pytest.approx(metrics["clearance_truth_m"][name], abs=0.01)

@@ -1,4 +1,4 @@
-"""Whole flights through ROS with the command that a user types, judged by the JSON that it leaves."""
+"""Whole flights through ROS with a user's command, judged by the JSON that it leaves."""
 
 import json
 import signal
@@ -62,7 +62,9 @@ def fly(directory: Path, *arguments: str, bare: bool = False) -> Flight:
 def _start_bare(environment: Dict[str, str]) -> subprocess.Popen:
     program = str(Path(__file__).parent / "bare_stream.py")
     environment = {**environment, "ROS_HOSTNAME": "localhost"}
-    return subprocess.Popen([sys.executable, program], env=environment, stdout=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        [sys.executable, program], env=environment, stdout=subprocess.PIPE, text=True
+    )
 
 
 def _gap_of(beside: subprocess.Popen) -> float:
@@ -78,7 +80,9 @@ def _only(paths: Any, output: str) -> Path:
 def corner_distances(flight: Flight, corners: np.ndarray) -> np.ndarray:
     """Return the least true distance [m] from each corner (n, 3)."""
     record = read_flight(flight.bag)
-    position = record.true_position.between(record.reference.start, record.phase_end or np.inf).values
+    position = record.true_position.between(
+        record.reference.start, record.phase_end or np.inf
+    ).values
     return np.array([np.linalg.norm(position - corner, axis=1).min() for corner in corners])
 
 
@@ -143,7 +147,10 @@ def test_on_the_other_plant_it_is_at_most_half_as_bad_again(name, request, tmp_p
 
 
 def test_without_avoidance_it_collides_and_says_so(tmp_path):
-    """Twin of multi_obstacle: problem and guard do not know the spheres, so the gate above can fail."""
+    """Twin of multi_obstacle.
+
+    Problem and guard do not know the spheres, so the gate above can fail.
+    """
     flight = fly(tmp_path, "multi_obstacle", "--avoidance", "off", "--speed", "1.5")
     assert flight.metrics["collisions"] >= 1
     assert flight.status == 1
@@ -153,7 +160,8 @@ def test_an_own_scenario_file_is_flown_by_its_path(tmp_path):
     scenario = tmp_path / "mine.yaml"
     scenario.write_text(
         "speed: 1.0\nreference: {type: waypoints, points: [[0, 0, 2], [3, 0, 2]]}\n"
-        "obstacles: [{id: pole, shape: cylinder, position: [1.5, 1.7, 2], radius: 0.3, height: 4}]\n"
+        "obstacles:\n"
+        "- {id: pole, shape: cylinder, position: [1.5, 1.7, 2], radius: 0.3, height: 4}\n"
     )
     flight = fly(tmp_path, str(scenario), "--speed", "1.5")
     assert flight.status == 0, flight.output
@@ -164,7 +172,12 @@ def test_an_own_scenario_file_is_flown_by_its_path(tmp_path):
 def test_bad_input_starts_nothing(tmp_path):
     command = ["rosrun", "uav_sim", "fly", "nowhere", "--bags", str(tmp_path / "bags")]
     done = subprocess.run(
-        command, env=workspace_environment(), capture_output=True, text=True, timeout=60, check=False
+        command,
+        env=workspace_environment(),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1

@@ -1,4 +1,7 @@
-"""Problems that the solver tests share: random states beside a straight reference, with or without a sphere."""
+"""Problems that the solver tests share.
+
+Random states beside a straight reference, with or without a sphere.
+"""
 
 import dataclasses
 from typing import List, Sequence

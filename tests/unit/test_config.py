@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from nmpc_control.config import load_yaml
+from nmpc_control.config import from_dict, load_yaml
 from nmpc_control.errors import ConfigError
 from nmpc_control.params import Lag, config_directory, load_parameters, load_vehicle, load_weights
-from nmpc_control.config import from_dict
 
 
 def write(tmp_path, text):
@@ -38,7 +37,8 @@ def test_bad_values_name_file_key_and_value(tmp_path, text, words):
 
 
 @pytest.mark.parametrize(
-    "text", ["a: [1, 2\n", "a: 1\na: 2\n", "- 1\n- 2\n", "", "!!python/object/apply:os.system ['true']\n"],
+    "text",
+    ["a: [1, 2\n", "a: 1\na: 2\n", "- 1\n- 2\n", "", "!!python/object/apply:os.system ['true']\n"],
     ids=["syntax", "key twice", "a list", "empty", "code"],
 )
 def test_unusable_files_end_in_one_line(tmp_path, text):
@@ -59,7 +59,9 @@ def test_numbers_with_an_exponent_are_numbers(tmp_path):
     assert load_yaml(write(tmp_path, "a: 1e-3\n"))["a"] == 1e-3
 
 
-@pytest.mark.parametrize("name", sorted(p.stem for p in (config_directory() / "vehicles").glob("*.yaml")))
+@pytest.mark.parametrize(
+    "name", sorted(p.stem for p in (config_directory() / "vehicles").glob("*.yaml"))
+)
 def test_every_vehicle_hovers_inside_its_thrust_range(name):
     vehicle = load_vehicle(name)
     percent = vehicle.thrust_map.percent(9.81)
@@ -69,7 +71,9 @@ def test_every_vehicle_hovers_inside_its_thrust_range(name):
     assert vehicle.thrust_map.thrust(percent) == pytest.approx(9.81)
 
 
-@pytest.mark.parametrize("name", sorted(p.stem for p in (config_directory() / "weights").glob("*.yaml")))
+@pytest.mark.parametrize(
+    "name", sorted(p.stem for p in (config_directory() / "weights").glob("*.yaml"))
+)
 def test_every_weight_preset_loads_and_hover_is_inside_the_limits(name):
     parameters = load_parameters("dji_hil", name)
     assert np.all(load_weights(name).Q >= 0)

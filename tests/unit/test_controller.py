@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from nmpc_control.controller import Controller
-
 from nmpc_control.params import load_parameters
 from nmpc_control.prediction import predict
 from nmpc_control.state import GRAVITY, POSITION, Goal, Obstacle
@@ -20,7 +19,9 @@ def controller() -> Controller:
     return Controller(load_parameters("dji_hil"))
 
 
-def tell(controller: Controller, t: float, position=(0.0, 0.0, 5.0), velocity=(0.0, 0.0, 0.0)) -> None:
+def tell(
+    controller: Controller, t: float, position=(0.0, 0.0, 5.0), velocity=(0.0, 0.0, 0.0)
+) -> None:
     controller.estimator.add_attitude(t, LEVEL)
     controller.estimator.add_imu(t, (0.0, 0.0, 0.0))
     controller.estimator.add_velocity(t, velocity)
@@ -78,7 +79,9 @@ def test_input_that_is_not_finite_is_not_remembered(controller):
 def test_clearance_counts_from_the_hull(controller):
     controller.obstacles = (Obstacle("s", np.array([3.0, 0.0, 5.0]), np.array([0.7])),)
     tell(controller, 0.0)
-    assert controller.step(0.0).clearance == pytest.approx(3.0 - 0.7 - controller.parameters.vehicle.radius)
+    assert controller.step(0.0).clearance == pytest.approx(
+        3.0 - 0.7 - controller.parameters.vehicle.radius
+    )
     controller.obstacles = ()
     assert controller.step(0.02).clearance == np.inf
 
@@ -86,7 +89,9 @@ def test_clearance_counts_from_the_hull(controller):
 def test_new_weights_act_without_a_new_solver(controller):
     tell(controller, 0.0, velocity=(1.0, 0.0, 0.0))
     solver, before = controller.nmpc.solver, controller.step(0.0).plan.cost
-    weights = dataclasses.replace(controller.parameters.weights, Q=controller.parameters.weights.Q * 2)
+    weights = dataclasses.replace(
+        controller.parameters.weights, Q=controller.parameters.weights.Q * 2
+    )
     controller.use(dataclasses.replace(controller.parameters, weights=weights))
     assert controller.nmpc.solver is solver
     assert controller.step(0.02).plan.cost > 1.1 * before

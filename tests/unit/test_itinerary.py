@@ -41,7 +41,9 @@ def test_trajectory_begins_after_the_approach_has_settled(itinerary):
     follow(itinerary, 0.0, leg)
     assert itinerary.goal is Goal.APPROACH
     follow(itinerary, leg, leg + 20.0)
-    assert itinerary.clock_start is None or itinerary.clock_start >= leg + itinerary.flight.settle_time
+    assert (
+        itinerary.clock_start is None or itinerary.clock_start >= leg + itinerary.flight.settle_time
+    )
 
 
 def test_the_reference_does_not_look_into_the_trajectory_before_its_clock_runs(itinerary):

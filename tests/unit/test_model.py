@@ -41,7 +41,11 @@ def test_exact_lag_is_within_one_percent_of_the_exact_solution_for_every_lag(nam
     F = step_function(DT, "exact_lag")
     u = np.array([GRAVITY, 0.3, 0.2, 0.5])
     x = call(F, hover_state(np.zeros(3)), u, model_parameters(vehicle))
-    for index, lag, target in ((3, vehicle.roll, 0.3), (4, vehicle.pitch, 0.2), (9, vehicle.yaw_rate, 0.5)):
+    for index, lag, target in (
+        (3, vehicle.roll, 0.3),
+        (4, vehicle.pitch, 0.2),
+        (9, vehicle.yaw_rate, 0.5),
+    ):
         exact = lag.gain * target * (1 - np.exp(-DT / lag.time_constant))
         assert x[index] == pytest.approx(exact, rel=1e-12)
 
@@ -50,13 +54,21 @@ def test_exact_lag_is_within_one_percent_of_the_exact_solution_for_every_lag(nam
 def test_exact_lag_agrees_with_scipy_over_one_step(name):
     vehicle = load_vehicle(name)
     p = model_parameters(vehicle, np.array([0.3, -0.2, 0.1]))
-    x_symbol, u_symbol, p_symbol = ca.SX.sym("x", NX), ca.SX.sym("u", NU), ca.SX.sym("p", MODEL_SIZE)
+    x_symbol, u_symbol, p_symbol = (
+        ca.SX.sym("x", NX),
+        ca.SX.sym("u", NU),
+        ca.SX.sym("p", MODEL_SIZE),
+    )
     f = ca.Function("f", [x_symbol, u_symbol, p_symbol], [continuous(x_symbol, u_symbol, p_symbol)])
     F = step_function(DT, "exact_lag")
+
+    def derivative(_, y, u):
+        return call(f, y, u, p)
+
     rng = np.random.default_rng(1)
     for _ in range(20):
         x, u = random_state(rng), random_input(rng)
-        exact = solve_ivp(lambda t, y: call(f, y, u, p), (0, DT), x, rtol=1e-10, atol=1e-12).y[:, -1]  # noqa: B023
+        exact = solve_ivp(derivative, (0, DT), x, args=(u,), rtol=1e-10, atol=1e-12).y[:, -1]
         # 1 % of the speed that the thrust gives in one step
         assert call(F, x, u, p) == pytest.approx(exact, abs=0.01 * u[0] * DT)
         assert call(F, x, u, p)[3:6] == pytest.approx(exact[3:6], abs=1e-8)
@@ -66,7 +78,10 @@ def test_one_euler_step_is_unstable_for_the_papers_lags_and_the_exact_one_is_not
     p = model_parameters(load_vehicle("paper"))
     tilted = hover_state(np.zeros(3))
     tilted[3] = 0.1
-    factors = {i: call(step_function(DT, i), tilted, hover_input(), p)[3] / 0.1 for i in ("euler", "exact_lag")}
+    factors = {
+        i: call(step_function(DT, i), tilted, hover_input(), p)[3] / 0.1
+        for i in ("euler", "exact_lag")
+    }
     assert factors["euler"] == pytest.approx(-1.41, abs=0.01)
     assert 0 < factors["exact_lag"] < 1
 
@@ -81,7 +96,9 @@ def test_speed_decays_under_drag(axis):
 
 
 @pytest.mark.parametrize(
-    ("index", "tilt", "sign"), [(3, 0.1, (0, -1)), (4, 0.1, (1, 0))], ids=["roll to the right", "pitch forward"]
+    ("index", "tilt", "sign"),
+    [(3, 0.1, (0, -1)), (4, 0.1, (1, 0))],
+    ids=["roll to the right", "pitch forward"],
 )
 def test_tilt_accelerates_in_the_direction_of_the_dji_signs(index, tilt, sign):
     x = hover_state(np.zeros(3))
@@ -99,12 +116,16 @@ def test_the_plain_float_twin_makes_the_same_step():
         p = model_parameters(vehicle)
         for _ in range(10):
             x, u = random_state(rng), random_input(rng)
-            assert call(step_function(DT), x, u, p) == pytest.approx(prediction.step(x, u, DT, vehicle), abs=2e-3)
+            assert call(step_function(DT), x, u, p) == pytest.approx(
+                prediction.step(x, u, DT, vehicle), abs=2e-3
+            )
 
 
 def test_disturbance_is_an_acceleration_in_the_world_frame():
     vehicle = dataclasses.replace(load_vehicle("dji_hil"), drag=np.zeros(3))
     d = np.array([0.5, -0.3, 0.2])
-    after = call(step_function(DT), hover_state(np.zeros(3)), hover_input(), model_parameters(vehicle, d))
+    after = call(
+        step_function(DT), hover_state(np.zeros(3)), hover_input(), model_parameters(vehicle, d)
+    )
     assert after[6:9] == pytest.approx(d * DT)
     assert after[:3] == pytest.approx(d * DT**2 / 2)

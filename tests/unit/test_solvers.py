@@ -1,4 +1,7 @@
-"""Both backends on the same problems: against each other, and against what must hold by the problem's statement."""
+"""Both backends on the same problems.
+
+Against each other, and against what must hold by the problem's statement.
+"""
 
 import dataclasses
 import time
@@ -38,7 +41,9 @@ def test_compiled_and_ipopt_find_the_same_optimum_with_active_bounds(compiled, i
         ours, theirs = solve(compiled, x0), solve(ipopt, x0)
         assert ours.cost == pytest.approx(theirs.cost, rel=1e-5)
         span = compiled.parameters.limits.input_max - compiled.parameters.limits.input_min
-        assert np.abs(ours.inputs[0] - theirs.inputs[0]) == pytest.approx(0.0, abs=1e-3 * span.min())
+        assert np.abs(ours.inputs[0] - theirs.inputs[0]) == pytest.approx(
+            0.0, abs=1e-3 * span.min()
+        )
         bounded += np.any(np.isclose(ours.inputs, compiled.parameters.limits.input_max, atol=1e-9))
     assert bounded >= 3, "the sample must hold problems with active bounds"
 
@@ -47,7 +52,9 @@ def test_compiled_is_not_worse_than_ipopt_beside_an_obstacle(compiled, ipopt):
     ratios = []
     for x0 in random_states(12, seed=4):
         ratios.append(solve(compiled, x0, (SPHERE,)).cost / solve(ipopt, x0, (SPHERE,)).cost)
-    assert np.median(ratios) <= 1.0 + 1e-3  # the problem is not convex there: single ones may differ
+    assert (
+        np.median(ratios) <= 1.0 + 1e-3
+    )  # the problem is not convex there: single ones may differ
 
 
 @pytest.mark.parametrize("backend", ["compiled", "ipopt"])
@@ -57,14 +64,16 @@ def test_plan_satisfies_dynamics_and_bounds(backend):
         plan = solve(nmpc, x0, (SPHERE,))
         assert plan.states[0] == pytest.approx(x0)
         for k in range(plan.horizon):
-            expected = prediction.step(plan.states[k], plan.inputs[k], plan.dt, nmpc.parameters.vehicle)
+            expected = prediction.step(
+                plan.states[k], plan.inputs[k], plan.dt, nmpc.parameters.vehicle
+            )
             assert plan.states[k + 1] == pytest.approx(expected, abs=3e-3)
         assert np.all(plan.inputs >= nmpc.parameters.limits.input_min - 1e-9)
         assert np.all(plan.inputs <= nmpc.parameters.limits.input_max + 1e-9)
 
 
 def test_gradient_of_the_backward_sweep_matches_finite_differences():
-    """The slope along the step, which line search and convergence rest on, is the true derivative of the cost."""
+    """The slope that line search and convergence rest on is the cost's true derivative."""
     nmpc = tight("compiled")
     x0 = random_states(1, seed=6)[0]
     nmpc.solver.max_iterations = 0
@@ -114,11 +123,15 @@ def test_terminal_stage_has_its_own_weight(compiled):
     x0 = random_states(1, seed=8)[0]
     light = solve(compiled, x0)
     base = compiled.parameters
-    heavy = dataclasses.replace(base, weights=dataclasses.replace(base.weights, Q_f=base.weights.Q_f * 1000))
+    heavy = dataclasses.replace(
+        base, weights=dataclasses.replace(base.weights, Q_f=base.weights.Q_f * 1000)
+    )
     compiled.use(heavy)
     try:
         end = straight_reference(compiled)[-1, :3]
-        assert np.linalg.norm(solve(compiled, x0).states[-1, :3] - end) < np.linalg.norm(light.states[-1, :3] - end)
+        assert np.linalg.norm(solve(compiled, x0).states[-1, :3] - end) < np.linalg.norm(
+            light.states[-1, :3] - end
+        )
     finally:
         compiled.use(base)
 
@@ -129,7 +142,9 @@ def test_obstacle_bends_the_plan_out_of_the_margin_and_without_avoidance_it_does
     sphere = Obstacle("on the path", np.array([4.5, 0.1, 5.0]), np.array([0.5]))
     assert np.min(sphere.distance(solve(compiled, x0, (sphere,)).states[:, :3])) > 0.9
     base = compiled.parameters
-    compiled.use(dataclasses.replace(base, avoidance=dataclasses.replace(base.avoidance, enabled=False)))
+    compiled.use(
+        dataclasses.replace(base, avoidance=dataclasses.replace(base.avoidance, enabled=False))
+    )
     try:
         assert np.min(sphere.distance(solve(compiled, x0, (sphere,)).states[:, :3])) < 0.0
     finally:
@@ -152,7 +167,9 @@ def test_more_obstacles_than_slots_keeps_the_nearest(compiled):
     x0[6] = 1.5
     sphere = Obstacle("near", np.array([4.5, 0.1, 5.0]), np.array([0.5]))
     far = [Obstacle(f"far{i}", np.array([50.0, i, 5.0]), np.array([0.5])) for i in range(50)]
-    assert solve(compiled, x0, (*far, sphere)).cost == pytest.approx(solve(compiled, x0, (sphere,)).cost, rel=1e-6)
+    assert solve(compiled, x0, (*far, sphere)).cost == pytest.approx(
+        solve(compiled, x0, (sphere,)).cost, rel=1e-6
+    )
 
 
 def test_warm_start_needs_fewer_iterations_than_a_cold_one(compiled):
@@ -217,9 +234,14 @@ def test_compiled_library_is_reused(monkeypatch, tmp_path):
     "spoil",
     [
         lambda p: dataclasses.replace(p, weights=dataclasses.replace(p.weights, Q=-p.weights.Q)),
-        lambda p: dataclasses.replace(p, weights=dataclasses.replace(p.weights, R=p.weights.R * np.nan)),
         lambda p: dataclasses.replace(
-            p, limits=dataclasses.replace(p.limits, input_min=p.limits.input_max, input_max=p.limits.input_min)
+            p, weights=dataclasses.replace(p.weights, R=p.weights.R * np.nan)
+        ),
+        lambda p: dataclasses.replace(
+            p,
+            limits=dataclasses.replace(
+                p.limits, input_min=p.limits.input_max, input_max=p.limits.input_min
+            ),
         ),
     ],
     ids=["negative weight", "NaN weight", "bounds crossed"],

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""CasADi functions as compiled C: generated once, cached by source, compiler, flags and processor."""
+"""CasADi functions as compiled C.
+
+Generated once, cached by source, compiler, flags and processor.
+"""
 
 import hashlib
 import logging
@@ -25,18 +28,24 @@ def cache_directory() -> Path:
     return Path(os.environ.get("NMPC_CACHE", default))
 
 
-def compile_functions(functions: Sequence[ca.Function], compiler: str = "cc") -> Dict[str, ca.Function]:
+def compile_functions(
+    functions: Sequence[ca.Function], compiler: str = "cc"
+) -> Dict[str, ca.Function]:
     """Return the functions as compiled code, by name; as they are where there is no compiler."""
     interpreted = {f.name(): f for f in functions}
     program = shutil.which(compiler)
     if program is None:
-        LOGGER.warning("no C compiler %r: solving with CasADi's interpreter, about ten times slower", compiler)
+        LOGGER.warning(
+            "no C compiler %r: solving with CasADi's interpreter, about ten times slower", compiler
+        )
         return interpreted
     try:
         library = _library(functions, program)
     except (OSError, subprocess.CalledProcessError) as error:
         detail = getattr(error, "stderr", "") or str(error)
-        LOGGER.warning("compilation failed, solving with CasADi's interpreter: %s", detail.strip()[-500:])
+        LOGGER.warning(
+            "compilation failed, solving with CasADi's interpreter: %s", detail.strip()[-500:]
+        )
         return interpreted
     return {name: ca.external(name, str(library)) for name in interpreted}
 
@@ -46,7 +55,9 @@ def _library(functions: Sequence[ca.Function], program: str) -> Path:
     for function in functions:
         generator.add(function)
     source = generator.dump()
-    version = subprocess.run([program, "--version"], check=True, capture_output=True, text=True).stdout
+    version = subprocess.run(
+        [program, "--version"], check=True, capture_output=True, text=True
+    ).stdout
     key = "\0".join([source, version, " ".join(FLAGS), _processor(), ca.__version__])
     directory = cache_directory()
     directory.mkdir(parents=True, exist_ok=True)
@@ -57,7 +68,10 @@ def _library(functions: Sequence[ca.Function], program: str) -> Path:
         c_file, product = Path(folder) / "nmpc.c", Path(folder) / "nmpc.so"
         c_file.write_text(source)
         subprocess.run(
-            [program, *FLAGS, str(c_file), "-o", str(product), "-lm"], check=True, capture_output=True, text=True
+            [program, *FLAGS, str(c_file), "-o", str(product), "-lm"],
+            check=True,
+            capture_output=True,
+            text=True,
         )
         os.replace(product, library)  # atomic: another process may be doing the same
     return library
@@ -75,12 +89,17 @@ def _processor() -> str:
 
 
 class Buffered:
-    """A CasADi function called through fixed buffers: no allocation, the GIL is released during the call.
+    """A CasADi function called through fixed buffers.
 
-    ``inputs[name]`` and ``outputs[name]`` are numpy arrays (Fortran order) that the call reads and writes.
+    No allocation, the GIL is released during the call.
+
+    ``inputs[name]`` and ``outputs[name]`` are numpy arrays (Fortran order) that the call reads and
+    writes.
     """
 
-    def __init__(self, function: ca.Function, shared: Optional[Dict[str, np.ndarray]] = None) -> None:
+    def __init__(
+        self, function: ca.Function, shared: Optional[Dict[str, np.ndarray]] = None
+    ) -> None:
         self._function = function
         self._buffer, self._trigger = function.buffer()
         self.inputs: Dict[str, np.ndarray] = {}
@@ -95,7 +114,9 @@ class Buffered:
             self._buffer.set_res(i, memoryview(array.T))
 
     @staticmethod
-    def _array(name: str, size: Sequence[int], shared: Optional[Dict[str, np.ndarray]]) -> np.ndarray:
+    def _array(
+        name: str, size: Sequence[int], shared: Optional[Dict[str, np.ndarray]]
+    ) -> np.ndarray:
         if shared is not None and name in shared:
             return shared[name]
         array = np.zeros(tuple(size), order="F")

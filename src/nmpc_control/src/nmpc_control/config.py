@@ -16,13 +16,15 @@ T = TypeVar("T")
 
 
 def config_directory() -> Path:
-    """Return the folder with the package's YAML files, in a source tree or where it is installed."""
+    """Return the folder of the package's YAML files, in a source tree or installed."""
     here = Path(__file__).resolve()
     candidates = (here.parents[2] / "config", here.parents[4] / "share" / "nmpc_control" / "config")
     for candidate in candidates:
         if candidate.is_dir():
             return candidate
-    raise ConfigError(str(candidates[0]), "config", "no such folder", "the package's configuration folder")
+    raise ConfigError(
+        str(candidates[0]), "config", "no such folder", "the package's configuration folder"
+    )
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
@@ -32,12 +34,16 @@ class _UniqueKeyLoader(yaml.SafeLoader):
         keys = [self.construct_object(key, deep=True) for key, _ in node.value]
         for key in keys:
             if keys.count(key) > 1:
-                raise yaml.constructor.ConstructorError(None, None, f"key {key!r} given twice", node.start_mark)
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"key {key!r} given twice", node.start_mark
+                )
         return super().construct_mapping(node, deep)
 
 
 _UniqueKeyLoader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+$"), list("-+0123456789")
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+$"),
+    list("-+0123456789"),
 )
 
 
@@ -57,14 +63,18 @@ def load_yaml(path: Union[str, Path]) -> Dict[str, Any]:
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1}" if mark else "file"
-        raise ConfigError(str(path), where, getattr(error, "problem", str(error)), "valid YAML") from None
+        raise ConfigError(
+            str(path), where, getattr(error, "problem", str(error)), "valid YAML"
+        ) from None
     if not isinstance(data, dict):
         raise ConfigError(str(path), "file", data, "a mapping of keys to values")
     return data
 
 
 def from_dict(cls: Type[T], data: Any, source: str, key: str = "") -> T:
-    """Build the dataclass ``cls`` from a mapping; a field's metadata may give ``min``, ``max``, ``choices``, ``length``.
+    """Build the dataclass ``cls`` from a mapping.
+
+    A field's metadata may give ``min``, ``max``, ``choices``, ``length``.
 
     Raises:
         ConfigError: naming source, key, value and what was expected.
@@ -76,7 +86,9 @@ def from_dict(cls: Type[T], data: Any, source: str, key: str = "") -> T:
     prefix = f"{key}." if key else ""
     for name in data:
         if name not in fields:
-            raise ConfigError(source, f"{prefix}{name}", data[name], f"one of the keys {', '.join(fields)}")
+            raise ConfigError(
+                source, f"{prefix}{name}", data[name], f"one of the keys {', '.join(fields)}"
+            )
     values = {}
     for name, f in fields.items():
         if name in data:
@@ -86,7 +98,9 @@ def from_dict(cls: Type[T], data: Any, source: str, key: str = "") -> T:
     return cls(**values)
 
 
-def number(value: Any, source: str, key: str, minimum: float = -math.inf, maximum: float = math.inf) -> float:
+def number(
+    value: Any, source: str, key: str, minimum: float = -math.inf, maximum: float = math.inf
+) -> float:
     """Return a finite number within bounds, or raise ConfigError."""
     expected = "a finite number"
     if math.isfinite(minimum) or math.isfinite(maximum):
@@ -118,7 +132,9 @@ def _convert(value: Any, hint: Any, metadata: Any, source: str, key: str) -> Any
     if hint is str:
         choices = metadata.get("choices")
         if not isinstance(value, str) or (choices and value not in choices):
-            raise ConfigError(source, key, value, f"one of {', '.join(choices)}" if choices else "text")
+            raise ConfigError(
+                source, key, value, f"one of {', '.join(choices)}" if choices else "text"
+            )
         return value
     if hint is np.ndarray or origin in (tuple, Tuple):
         length = metadata.get("length")

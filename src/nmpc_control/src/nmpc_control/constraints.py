@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Inequalities g(x) <= 0 of the problem beside the bounds of the inputs, each softened exactly.
 
-The problem's penalty on them is rho max(0, g), an L1 penalty: exact, so g <= 0 holds at the solution where it can
-hold at all, and the solution is the nearest one where it cannot (e.g. pushed outside the fence by a gust). The compiled solver reaches it by
+The problem's penalty on them is rho max(0, g), an L1 penalty: exact, so g <= 0 holds at the
+solution where it can
+hold at all, and the solution is the nearest one where it cannot (e.g. pushed outside the fence by a
+gust). The compiled solver reaches it by
 an augmented Lagrangian with multipliers bounded by rho; IPOPT by slack variables.
 """
 
@@ -40,4 +42,6 @@ def inequalities(
     # of second order in the excess, but smooth at rest, unlike the norm
     speed = (ca.dot(velocity, velocity) - bounds["speed"] ** 2) / (2 * bounds["speed"])
     obstacles = [bounds["hard_obstacles"] * (least - d) for d, least in distances]
-    return ca.vertcat(speed, position - bounds["fence_max"], bounds["fence_min"] - position, *obstacles)
+    return ca.vertcat(
+        speed, position - bounds["fence_max"], bounds["fence_min"] - position, *obstacles
+    )

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""One control step, in the order in which data flows: estimate, delay, reference, obstacles, solve."""
+"""One control step, in the order in which data flows.
+
+Estimate, delay, reference, obstacles, solve.
+"""
 
 from collections import deque
 from dataclasses import dataclass
@@ -37,7 +40,10 @@ class Step:
 
 
 class Controller:
-    """Estimator, itinerary and optimiser behind one ``step(t)``; telemetry and obstacles come in between."""
+    """Estimator, itinerary and optimiser behind one ``step(t)``.
+
+    Telemetry and obstacles come in between.
+    """
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
@@ -62,7 +68,7 @@ class Controller:
             self._inputs.popleft()
 
     def step(self, t: float) -> Optional[Step]:
-        """Return the plan to be commanded from ``t`` [s] on, or None while the state is missing or stale."""
+        """Return the plan for ``t`` [s] and after, or None while the state is missing or stale."""
         estimate = self.estimator.estimate(t)
         if estimate is None or estimate.age > self.parameters.flight.state_timeout:
             self.nmpc.reset()
@@ -88,7 +94,10 @@ class Controller:
         )
 
     def _input_before(self, t: float) -> np.ndarray:
-        """Return the input (4,) in force before ``t``: the last one sent, hover where none is recent."""
+        """Return the input (4,) in force before ``t``.
+
+        The last one sent, hover where none is recent.
+        """
         if self._inputs and t - self._inputs[-1][0] < _INPUT_MEMORY:
             return self._inputs[-1][1]
         return hover_input()

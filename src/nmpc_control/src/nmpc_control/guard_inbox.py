@@ -13,7 +13,10 @@ from nmpc_control.state import Goal, Obstacle, Plan
 
 
 class GuardInbox:
-    """Newest message of each kind; ``inputs(t)`` gives what a tick at ``t`` sees and empties plan and request."""
+    """Newest message of each kind.
+
+    ``inputs(t)`` gives what a tick at ``t`` sees and empties plan and request.
+    """
 
     def __init__(self, params: GuardParameters) -> None:
         self.estimator = Estimator()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The IPOPT backend: the same problem by multiple shooting, the paper's method and the tests' oracle."""
+"""The IPOPT backend: multiple shooting, the paper's method and the tests' oracle."""
 
 import time
 from typing import Any, Dict, Optional
@@ -8,7 +8,16 @@ import casadi as ca
 import numpy as np
 
 from nmpc_control import constraints
-from nmpc_control.ocp import PARTS, THETA_SIZE, Instance, Structure, Symbols, inequalities, next_state, stage_cost
+from nmpc_control.ocp import (
+    PARTS,
+    THETA_SIZE,
+    Instance,
+    Structure,
+    Symbols,
+    inequalities,
+    next_state,
+    stage_cost,
+)
 from nmpc_control.solution import Guess, Solution, cold_guess, worst_violation
 from nmpc_control.state import NU, NX
 
@@ -39,7 +48,9 @@ class IpoptSolver:
             "bound_relax_factor": 0.0,  # relaxed slacks would pay for themselves in the cost
             **(options or {}),
         }
-        self._solver = ca.nlpsol("nmpc", "ipopt", _transcribe(structure), {"print_time": False, "ipopt": ipopt})
+        self._solver = ca.nlpsol(
+            "nmpc", "ipopt", _transcribe(structure), {"print_time": False, "ipopt": ipopt}
+        )
 
     def solve(self, instance: Instance, guess: Optional[Guess] = None) -> Solution:
         """Return the solution from a guess, or from hover where there is none."""
@@ -50,9 +61,14 @@ class IpoptSolver:
         count = self.structure.inequalities * (N + 1)
         lower, upper = np.full(slacks + count, -np.inf), np.full(slacks + count, np.inf)
         lower[:NX] = upper[:NX] = instance.x0
-        lower[free_states:slacks], upper[free_states:slacks] = np.tile(instance.input_min, N), np.tile(instance.input_max, N)
+        lower[free_states:slacks], upper[free_states:slacks] = (
+            np.tile(instance.input_min, N),
+            np.tile(instance.input_max, N),
+        )
         lower[slacks:] = 0.0
-        parameters = np.concatenate([instance.u_before, instance.theta, instance.stages.ravel(order="F")])
+        parameters = np.concatenate(
+            [instance.u_before, instance.theta, instance.stages.ravel(order="F")]
+        )
         result = self._solver(
             x0=np.concatenate([guess.states.ravel(), guess.inputs.ravel(), np.zeros(count)]),
             lbx=lower,
@@ -77,7 +93,10 @@ class IpoptSolver:
             inputs=np.clip(inputs, instance.input_min, instance.input_max),
             cost=float(result["f"]),
             iterations=int(stats["iter_count"]),
-            kkt_residual=max(defect, float(stats["iterations"]["inf_du"][-1]) if stats["iter_count"] >= 0 else np.inf),
+            kkt_residual=max(
+                defect,
+                float(stats["iterations"]["inf_du"][-1]) if stats["iter_count"] >= 0 else np.inf,
+            ),
             active_bounds=int(np.sum(np.abs(multipliers) > 1e-4)),
             solve_time=time.perf_counter() - start,
             violation=violation,
@@ -89,7 +108,9 @@ def _transcribe(structure: Structure) -> Dict[str, ca.SX]:
     N = structure.horizon
     s = Symbols(structure)
     step = ca.Function("step", [s.x, s.u, s.theta], [next_state(structure, s)])
-    inner = ca.Function("l", [s.x, s.u, s.u_before, s.stage, s.theta], [stage_cost(structure, s, False)])
+    inner = ca.Function(
+        "l", [s.x, s.u, s.u_before, s.stage, s.theta], [stage_cost(structure, s, False)]
+    )
     last = ca.Function("l_N", [s.x, s.stage, s.theta], [stage_cost(structure, s, True)])
     bounds = ca.Function("g", [s.x, s.stage, s.theta], [inequalities(structure, s)])
     X, U = ca.SX.sym("X", NX, N + 1), ca.SX.sym("U", NU, N)

@@ -20,7 +20,10 @@ class Outcome:
 
 
 class Itinerary:
-    """Sequence of references; ``update`` moves it on, ``reference`` samples it, nothing asks for the time."""
+    """Sequence of references.
+
+    ``update`` moves it on, ``reference`` samples it, nothing asks for the time.
+    """
 
     def __init__(self, flight: Flight) -> None:
         self.flight = flight
@@ -39,13 +42,15 @@ class Itinerary:
             self._end(False, message)
         self._hold = (np.array(position, dtype=float), float(yaw))
 
-    def go_to(self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float) -> None:
-        """Fly straight from a position (3,) [m] to a target (3,) [m], rest to rest, and hold there."""
+    def go_to(
+        self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float
+    ) -> None:
+        """Fly straight from a position (3,) [m] to a target (3,) [m] and hold there."""
         self._set_out(t, position, yaw, np.asarray(target, dtype=float), target_yaw)
         self.trajectory = None
 
     def fly(self, t: float, position: np.ndarray, yaw: float, trajectory: Trajectory) -> None:
-        """Fly from a position (3,) [m] to a trajectory's start, settle there, then fly the trajectory."""
+        """Fly from a position (3,) [m] to a trajectory's start, settle, then fly it."""
         first = trajectory.sample(np.zeros(1))
         self._set_out(t, position, yaw, first.position[0], float(first.yaw[0]))
         self.trajectory = trajectory
@@ -68,7 +73,9 @@ class Itinerary:
             if at_rest:
                 self._finish("arrived")
             elif t > self.clock_start + self.trajectory.duration + self.flight.arrival_timeout:
-                self._finish("the trajectory's time is over, its end was not reached", arrived=False)
+                self._finish(
+                    "the trajectory's time is over, its end was not reached", arrived=False
+                )
 
     def reference(self, times: np.ndarray) -> np.ndarray:
         """Return the reference states (M, 10) at times (M,) [s]; roll and pitch are zero."""
@@ -92,12 +99,26 @@ class Itinerary:
         """Return the part 0..1 of the trajectory's time that has passed at ``t`` [s]."""
         if self.goal is not Goal.TRAJECTORY:
             return 0.0
-        return float(np.clip((t - self.clock_start) / max(self.trajectory.duration, 1e-9), 0.0, 1.0))
+        return float(
+            np.clip((t - self.clock_start) / max(self.trajectory.duration, 1e-9), 0.0, 1.0)
+        )
 
-    def _set_out(self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float) -> None:
-        self.goal, self.outcome, self.clock_start, self._settled_since = Goal.APPROACH, None, None, None
+    def _set_out(
+        self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float
+    ) -> None:
+        self.goal, self.outcome, self.clock_start, self._settled_since = (
+            Goal.APPROACH,
+            None,
+            None,
+            None,
+        )
         self._leg = approach(
-            position, target, self.flight.approach_speed, self.flight.approach_acceleration, yaw, target_yaw
+            position,
+            target,
+            self.flight.approach_speed,
+            self.flight.approach_acceleration,
+            yaw,
+            target_yaw,
         )
         self._leg_start = t
 

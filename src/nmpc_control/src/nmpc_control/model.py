@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Model of the M100 with its inner attitude loops (paper, Eqs. 1, 3, 4), continuous and discrete, in CasADi.
+"""Model of the M100 with its inner attitude loops (paper, Eqs.
+
+1, 3, 4), continuous and discrete, in CasADi.
 
 With e_z the body z axis in the world frame, T the mass-normalised thrust and b the drag:
 
     p' = v                      phi'   = (k_phi phi_r - phi) / tau_phi       psi' = r
-    v' = T e_z - g - b v + d    theta' = (k_theta theta_r - theta) / tau_theta    r' = (k_psi r_r - r) / tau_psi
+    v' = T e_z - g - b v + d    theta' = (k_theta theta_r - theta) / tau_theta    r' = (k_psi r_r -
+    r) / tau_psi
 
-The paper's text subtracts a drag that is negative already (it would accelerate) and calls the roll and
+The paper's text subtracts a drag that is negative already (it would accelerate) and calls the roll
+and
 pitch references rates; here drag decelerates in the world frame and the references are angles. The
-paper's k / tau is ``1 / time_constant`` here. ``d`` is a constant acceleration that the model does not know.
+paper's k / tau is ``1 / time_constant`` here. ``d`` is a constant acceleration that the model does
+not know.
 """
 
 from typing import Optional
@@ -31,10 +36,14 @@ def model_parameters(vehicle: Vehicle, disturbance: Optional[np.ndarray] = None)
         disturbance: (3,) constant acceleration in the world frame [m/s^2].
 
     Returns:
-        Rates 1/tau [1/s] and gains [1] of roll, pitch, yaw rate; drag (3) [1/s]; gravity; disturbance (3).
+        Rates 1/tau [1/s] and gains [1] of roll, pitch, yaw rate; drag (3) [1/s]; gravity;
+        disturbance (3).
     """
     d = np.zeros(3) if disturbance is None else disturbance
-    lags = [(1.0 / lag.time_constant, lag.gain) for lag in (vehicle.roll, vehicle.pitch, vehicle.yaw_rate)]
+    lags = [
+        (1.0 / lag.time_constant, lag.gain)
+        for lag in (vehicle.roll, vehicle.pitch, vehicle.yaw_rate)
+    ]
     return np.concatenate([np.ravel(lags), vehicle.drag, [GRAVITY], d])
 
 
@@ -49,7 +58,10 @@ def continuous(x: ca.SX, u: ca.SX, p: ca.SX) -> ca.SX:
 
 
 def acceleration(angles: ca.SX, velocity: ca.SX, thrust: ca.SX, p: ca.SX) -> ca.SX:
-    """Return the world acceleration (3,) [m/s^2] of Eq. 1 for roll, pitch, yaw, velocity and thrust."""
+    """Return the world acceleration (3,) [m/s^2] of Eq.
+
+    1 for roll, pitch, yaw, velocity and thrust.
+    """
     cr, sr = ca.cos(angles[0]), ca.sin(angles[0])
     cp, sp = ca.cos(angles[1]), ca.sin(angles[1])
     cy, sy = ca.cos(angles[2]), ca.sin(angles[2])
@@ -60,7 +72,8 @@ def acceleration(angles: ca.SX, velocity: ca.SX, thrust: ca.SX, p: ca.SX) -> ca.
 def discrete(x: ca.SX, u: ca.SX, p: ca.SX, dt: float, integrator: str) -> ca.SX:
     """Return the state (10,) one step ``dt`` [s] later under a constant input.
 
-    ``euler`` is the paper's Eq. 6; ``rk4`` the classical scheme; ``exact_lag`` uses the exact step of the
+    ``euler`` is the paper's Eq. 6; ``rk4`` the classical scheme; ``exact_lag`` uses the exact step
+    of the
     linear lags and Runge-Kutta weights for the translation that they drive.
     """
     if integrator == "euler":
@@ -98,4 +111,6 @@ def _exact_lag(x: ca.SX, u: ca.SX, p: ca.SX, dt: float) -> ca.SX:
 def step_function(dt: float, integrator: str = "exact_lag") -> ca.Function:
     """Return the discrete model as a CasADi function (x (10,), u (4,), p (13,)) -> x_next (10,)."""
     x, u, p = ca.SX.sym("x", NX), ca.SX.sym("u", NU), ca.SX.sym("p", MODEL_SIZE)
-    return ca.Function("step", [x, u, p], [discrete(x, u, p, dt, integrator)], ["x", "u", "p"], ["x_next"])
+    return ca.Function(
+        "step", [x, u, p], [discrete(x, u, p, dt, integrator)], ["x", "u", "p"], ["x_next"]
+    )

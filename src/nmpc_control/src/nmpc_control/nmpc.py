@@ -31,7 +31,9 @@ class Nmpc:
         self._theta = self._pack_theta(parameters)
 
     def use(self, parameters: Parameters) -> None:
-        """Take over other weights, limits, avoidance or vehicle from the next solve on; the structure stays.
+        """Take over other weights, limits, avoidance or vehicle from the next solve on.
+
+        The structure stays.
 
         Raises:
             ProblemError: unusable numbers; the old parameters remain in force.
@@ -45,7 +47,7 @@ class Nmpc:
         self._last = None
 
     def stage_times(self, t: float) -> np.ndarray:
-        """Return the times (N + 1,) [s] at which the telemetry shows the stages of a plan made for ``t``."""
+        """Return when (N + 1,) [s] the telemetry shows the stages of a plan made for ``t``."""
         N = self.structure.horizon
         return t + self.parameters.vehicle.delay + self.structure.dt * np.arange(N + 1)
 
@@ -73,7 +75,9 @@ class Nmpc:
         """
         guess = self._guess(t)
         slots = self._slots(t, obstacles, x_ref[:, :3] if guess is None else guess.states[:, :3])
-        stages = pack_stages(self.structure, x_ref, hover_input(GRAVITY) if u_ref is None else u_ref, slots)
+        stages = pack_stages(
+            self.structure, x_ref, hover_input(GRAVITY) if u_ref is None else u_ref, slots
+        )
         solution = self.solver.solve(Instance(x0, u_before, stages, self._theta), guess)
         self._last, self._last_t = (solution, t) if solution.found else (None, 0.0)
         return Plan(
@@ -119,6 +123,8 @@ class Nmpc:
             slot = np.empty((len(times), SLOT_SIZE))
             slot[:, :3], slot[:, 3], slot[:, 4] = centres, vertical, 1.0 / (radius + margin)
             offset = (path - centres) * [1.0, 1.0, np.sqrt(vertical)]
-            ranked.append((float(np.min(np.linalg.norm(offset, axis=1)) - radius), len(ranked), slot))
+            ranked.append(
+                (float(np.min(np.linalg.norm(offset, axis=1)) - radius), len(ranked), slot)
+            )
         ranked.sort(key=lambda item: item[:2])
         return [slot for _, _, slot in ranked[: self.structure.obstacle_slots]]

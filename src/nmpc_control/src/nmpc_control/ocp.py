@@ -3,13 +3,15 @@
 
     minimise   sum_{k=0}^{N-1} |x_k - x_r,k|^2_Q + |u_k - u_r,k|^2_R + |u_k - u_{k-1}|^2_{R_delta}
                + |x_N - x_r,N|^2_{Q_f} + sum_{k=0}^{N} sum_i U_i(x_k)
-    subject to x_0 given, u_{-1} the input really applied before, x_{k+1} = F(x_k, u_k), u_min <= u_k <= u_max
+    subject to x_0 given, u_{-1} the input really applied before, x_{k+1} = F(x_k, u_k), u_min <=
+    u_k <= u_max
 
     U_i(x) = eta / 2 (1 / d_i - 1 / D_i)^2  where d_i < D_i, else 0            (Eq. 8)
                |u_k - u_{k-1}| <= dt u'_max
     softened   |v_k| <= v_max, p_min <= p_k <= p_max, and d_i >= D_i (Eq. 7) where that is selected
 
-d_i is the distance to the centre of obstacle i and D_i its radius plus hull plus safety distance. Everything
+d_i is the distance to the centre of obstacle i and D_i its radius plus hull plus safety distance.
+Everything
 but N, dt, the integrator and the number of obstacle slots is a run-time parameter.
 """
 
@@ -58,8 +60,15 @@ class Structure:
     obstacle_slots: int = 8
 
     def __post_init__(self) -> None:
-        if self.horizon < 1 or not self.dt > 0 or self.obstacle_slots < 0 or self.integrator not in INTEGRATORS:
-            raise ProblemError(f"structure: got {self}, expected N >= 1, dt > 0, slots >= 0 and a known integrator")
+        if (
+            self.horizon < 1
+            or not self.dt > 0
+            or self.obstacle_slots < 0
+            or self.integrator not in INTEGRATORS
+        ):
+            raise ProblemError(
+                f"structure: got {self}, expected N >= 1, dt > 0, slots >= 0 and a known integrator"
+            )
 
     @property
     def inequalities(self) -> int:
@@ -98,10 +107,20 @@ class Instance:
 
 
 def pack_theta(
-    vehicle: Vehicle, weights: Weights, limits: Limits, avoidance: Avoidance, disturbance: np.ndarray
+    vehicle: Vehicle,
+    weights: Weights,
+    limits: Limits,
+    avoidance: Avoidance,
+    disturbance: np.ndarray,
 ) -> np.ndarray:
-    """Return the parameter vector (THETA_SIZE,) shared by all stages; raises ProblemError on unusable numbers."""
-    potential, hard = avoidance.enabled and avoidance.term == "potential", avoidance.enabled and avoidance.term == "hard"
+    """Return the parameter vector (THETA_SIZE,) shared by all stages.
+
+    Raises ProblemError on unusable numbers.
+    """
+    potential, hard = (
+        avoidance.enabled and avoidance.term == "potential",
+        avoidance.enabled and avoidance.term == "hard",
+    )
     theta = np.concatenate(
         [
             model_parameters(vehicle, disturbance),
@@ -125,7 +144,9 @@ def pack_theta(
             raise ProblemError(f"{name}: got {theta[PARTS[name]]}, expected no negative value")
     for low, high in (("u_min", "u_max"), ("fence_min", "fence_max")):
         if np.any(theta[PARTS[low]] >= theta[PARTS[high]]):
-            raise ProblemError(f"{low}: got {theta[PARTS[low]]}, expected less than {high} {theta[PARTS[high]]}")
+            raise ProblemError(
+                f"{low}: got {theta[PARTS[low]]}, expected less than {high} {theta[PARTS[high]]}"
+            )
     if not limits.speed > 0:
         raise ProblemError(f"speed: got {limits.speed}, expected more than 0")
     return theta
@@ -185,7 +206,7 @@ def next_state(structure: Structure, s: Symbols) -> ca.SX:
 
 
 def residuals(structure: Structure, s: Symbols, terminal: bool) -> Tuple[ca.SX, ca.SX]:
-    """Return residuals r and weights w with stage cost sum w r^2, which is what Gauss-Newton needs."""
+    """Return residuals r and weights w with stage cost sum w r^2, as Gauss-Newton needs."""
     error = s.x - s.stage[:NX]
     error[YAW] -= 2 * ca.pi * ca.floor((error[YAW] + ca.pi) / (2 * ca.pi))
     potential = [_potential_root(s.x[:3], slot) for slot in _slots(structure, s.stage)]
@@ -199,7 +220,9 @@ def residuals(structure: Structure, s: Symbols, terminal: bool) -> Tuple[ca.SX, 
 
 
 def input_bounds(structure: Structure, s: Symbols) -> Tuple[ca.SX, ca.SX]:
-    """Return the least and greatest input (4,) of a stage: its bounds, and what the rate allows from the one before.
+    """Return the least and greatest input (4,) of a stage.
+
+    Its bounds, and what the rate allows from the one before.
 
     Where both cannot hold (the input before was outside the bounds) the bounds do.
     """
@@ -215,7 +238,7 @@ def inequalities(structure: Structure, s: Symbols) -> ca.SX:
 
 
 def augmented_residuals(structure: Structure, s: Symbols, terminal: bool) -> Tuple[ca.SX, ca.SX]:
-    """Return residuals and weights of the stage cost with the augmented Lagrangian of the inequalities."""
+    """Return residuals and weights of a stage with its augmented Lagrangian."""
     r, w = residuals(structure, s, terminal)
     mu = ca.DM(constraints.curvature(structure.obstacle_slots))
     excess = ca.fmax(0, inequalities(structure, s) + s.multipliers / mu)
@@ -223,14 +246,20 @@ def augmented_residuals(structure: Structure, s: Symbols, terminal: bool) -> Tup
 
 
 def stage_cost(structure: Structure, s: Symbols, terminal: bool) -> ca.SX:
-    """Return the cost of one stage (Eq. 5 with Eqs. 8, 9), without the penalty on the inequalities."""
+    """Return the cost of one stage (Eq.
+
+    5 with Eqs. 8, 9), without the penalty on the inequalities.
+    """
     r, w = residuals(structure, s, terminal)
     return ca.dot(w, r * r)
 
 
 def _slots(structure: Structure, stage: ca.SX) -> Sequence[ca.SX]:
     first = NX + NU
-    return [stage[first + SLOT_SIZE * i : first + SLOT_SIZE * (i + 1)] for i in range(structure.obstacle_slots)]
+    return [
+        stage[first + SLOT_SIZE * i : first + SLOT_SIZE * (i + 1)]
+        for i in range(structure.obstacle_slots)
+    ]
 
 
 def _distance(position: ca.SX, slot: ca.SX) -> ca.SX:

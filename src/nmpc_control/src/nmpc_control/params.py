@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Parameters of vehicle, problem, solver and controller; values live in ``config/*.yaml``, here is what they mean."""
+"""Parameters of vehicle, problem, solver and controller.
+
+Values live in ``config/*.yaml``, here is what they mean.
+"""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,7 +27,10 @@ def _non_negative() -> float:
 
 @dataclass(frozen=True)
 class Lag:
-    """First-order response of one inner loop: ``x' = (gain * reference - x) / time_constant`` (paper, Eq. 3)."""
+    """First-order response of one inner loop.
+
+    ``x' = (gain * reference - x) / time_constant`` (paper, Eq. 3).
+    """
 
     time_constant: float = _positive()  # [s]; the paper's tau / k
     gain: float = _positive()  # [1] static gain; 1 in the paper
@@ -32,7 +38,10 @@ class Lag:
 
 @dataclass(frozen=True)
 class ThrustMap:
-    """Affine map of the DJI thrust percentage: ``thrust = slope * percent + offset``, at hover attitude."""
+    """Affine map of the DJI thrust percentage.
+
+    ``thrust = slope * percent + offset``, at hover attitude.
+    """
 
     slope: float = _positive()  # [m/s^2 per percent]
     offset: float = field()  # [m/s^2]
@@ -41,7 +50,7 @@ class ThrustMap:
     measured_on: str = field()  # airframe and date of the measurement; empty: not measured
 
     def percent(self, thrust: float) -> float:
-        """Return the percentage for a mass-normalised thrust [m/s^2], clamped to the map's range."""
+        """Return the percentage for a thrust [m/s^2], clamped to the map's range."""
         return min(max((thrust - self.offset) / self.slope, self.minimum), self.maximum)
 
     def thrust(self, percent: float) -> float:
@@ -61,13 +70,18 @@ class Vehicle:
     yaw_rate: Lag = field()
     drag: np.ndarray = _array(3, 0.0)  # (3,) [1/s] world x, y, z
     delay: float = _non_negative()  # [s] dead time from command to effect in the telemetry
-    tilt_limit: float = _positive()  # [rad] the flight controller's own limit of the tilt vector's norm
+    tilt_limit: float = (
+        _positive()
+    )  # [rad] the flight controller's own limit of the tilt vector's norm
     thrust_map: ThrustMap = field()
 
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights of Eq. 5, all diagonal; they multiply squared errors in SI units, without a factor 1/2."""
+    """Weights of Eq. 5, all diagonal.
+
+    They multiply squared errors in SI units, without a factor 1/2.
+    """
 
     Q: np.ndarray = _array(10, 0.0)
     Q_f: np.ndarray = _array(10, 0.0)
@@ -77,7 +91,10 @@ class Weights:
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds of the inputs (paper, Eq. 6), which always hold, and bounds that are softened exactly."""
+    """Bounds of the inputs (paper, Eq.
+
+    6), which always hold, and bounds that are softened exactly.
+    """
 
     input_min: np.ndarray = _array(4)  # (4,) [m/s^2, rad, rad, rad/s]
     input_max: np.ndarray = _array(4)  # (4,)
@@ -87,9 +104,11 @@ class Limits:
     fence_max: np.ndarray = _array(3)  # (3,) [m]
     soft_weight: float = _positive()  # [1/m] of the L1 penalty on what is softened
 
-
     def within(self, vehicle: Vehicle) -> "Limits":
-        """Return the limits that the vehicle can really follow: its thrust range, its tilt limit on each axis."""
+        """Return the limits that the vehicle can really follow.
+
+        Its thrust range, its tilt limit on each axis.
+        """
         thrust_map, tilt = vehicle.thrust_map, vehicle.tilt_limit
         low = np.array([thrust_map.thrust(thrust_map.minimum), -tilt, -tilt, -np.inf])
         high = np.array([thrust_map.thrust(thrust_map.maximum), tilt, tilt, np.inf])
@@ -102,7 +121,9 @@ class Avoidance:
     """Repulsive potential of Eq. 8, with the distance counted from the hull."""
 
     enabled: bool = field()
-    term: str = field(metadata={"choices": ("potential", "hard")})  # Eq. 8 in the cost, or Eq. 7 softened exactly
+    term: str = field(
+        metadata={"choices": ("potential", "hard")}
+    )  # Eq. 8 in the cost, or Eq. 7 softened exactly
     eta: float = _non_negative()  # gain of the potential
     safety_distance: float = _non_negative()  # [m] hull to surface
     inflation: float = _non_negative()  # [m] added to the distance at which the potential begins
@@ -148,7 +169,9 @@ class Flight:
     approach_acceleration: float = _positive()  # [m/s^2]
     arrival_distance: float = _positive()  # [m]
     arrival_speed: float = _positive()  # [m/s]
-    settle_time: float = _non_negative()  # [s] at rest at the start before the trajectory's clock runs
+    settle_time: float = (
+        _non_negative()
+    )  # [s] at rest at the start before the trajectory's clock runs
     arrival_timeout: float = _positive()  # [s] after the end of the trajectory's time
     state_timeout: float = _positive()  # [s] a state older than this is not flown on
 
@@ -177,14 +200,16 @@ def load_weights(name: str, directory: Optional[Path] = None) -> Weights:
     return from_dict(Weights, load_yaml(path), path.name)
 
 
-def load_parameters(vehicle: str = "dji_hil", weights: str = "outdoor", directory: Optional[Path] = None) -> Parameters:
+def load_parameters(
+    vehicle: str = "dji_hil", weights: str = "outdoor", directory: Optional[Path] = None
+) -> Parameters:
     """Return the controller's parameters with a vehicle and a weight preset; raises ConfigError."""
     directory = directory or config_directory()
     path = directory / "controller.yaml"
     data = load_yaml(path)
-    return from_dict(
-        _File, data, path.name
-    ).with_presets(load_vehicle(vehicle, directory), load_weights(weights, directory))
+    return from_dict(_File, data, path.name).with_presets(
+        load_vehicle(vehicle, directory), load_weights(weights, directory)
+    )
 
 
 @dataclass(frozen=True)

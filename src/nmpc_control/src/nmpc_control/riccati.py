@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""The two sweeps of the compiled solver as CasADi functions: backward (Newton system), forward (rollout).
+"""The two sweeps of the compiled solver as CasADi functions.
 
-Backward, from stage N to 0 (discrete-time Riccati recursion of the Gauss-Newton model, see e.g. Frison and
-Jorgensen 2013; here the previous input is part of the state, so that R_delta keeps the stage structure):
-the exact adjoint gives the gradient g of the cost with respect to every input; inputs that sit on a bound
-with the gradient pushing outward are held (Bertsekas 1982, projected Newton), on a bound of their rate they
-follow the input before; the others get the feedback law du = k + K [dx; du_before]. Forward: the model is rolled out under that law with step length alpha, inputs
+Backward (Newton system), forward (rollout).
+
+Backward, from stage N to 0 (discrete-time Riccati recursion of the Gauss-Newton model, see e.g.
+Frison and
+Jorgensen 2013; here the previous input is part of the state, so that R_delta keeps the stage
+structure):
+the exact adjoint gives the gradient g of the cost with respect to every input; inputs that sit on a
+bound
+with the gradient pushing outward are held (Bertsekas 1982, projected Newton), on a bound of their
+rate they
+follow the input before; the others get the feedback law du = k + K [dx; du_before]. Forward: the
+model is rolled out under that law with step length alpha, inputs
 clipped to their bounds, so every iterate satisfies dynamics and bounds exactly.
 """
 
@@ -14,7 +21,15 @@ from typing import List, Optional, Tuple
 import casadi as ca
 import numpy as np
 
-from nmpc_control.ocp import THETA_SIZE, Structure, Symbols, augmented_residuals, inequalities, input_bounds, next_state
+from nmpc_control.ocp import (
+    THETA_SIZE,
+    Structure,
+    Symbols,
+    augmented_residuals,
+    inequalities,
+    input_bounds,
+    next_state,
+)
 from nmpc_control.state import NU, NX
 
 NZ = NX + NU  # state of the recursion: x and the input before
@@ -25,11 +40,14 @@ def sweeps(structure: Structure) -> Tuple[ca.Function, ca.Function, ca.Function]
     """Return the functions ``backward``, ``backward_exact`` and ``forward`` over the whole horizon.
 
     backward(X (10, N+1), U (4, N), u_before (4,), stages, theta, multipliers (nc, N+1), damping) ->
-        gains (4, 14 N), step (4, N), summary (4,): slope of the cost along the step, largest projected
+        gains (4, 14 N), step (4, N), summary (4,): slope of the cost along the step, largest
+        projected
         gradient (scaled by the input ranges), number of active bounds, least pivot of the recursion
-    backward_exact: the same with the exact Hessian of the Lagrangian, which need not be positive: the least
+    backward_exact: the same with the exact Hessian of the Lagrangian, which need not be
+        positive: the least
         pivot says whether its step may be used
-    forward(x0 (10,), u_before (4,), X, U, gains, step, alpha, stages, theta, multipliers) -> X_new, U_new,
+    forward(x0 (10,), u_before (4,), X, U, gains, step, alpha, stages, theta, multipliers) -> X_new,
+    U_new,
         cost (of the augmented Lagrangian, up to a constant), inequalities (nc, N+1)
     """
     return _backward(structure, False), _backward(structure, True), _forward(structure)
@@ -42,7 +60,12 @@ def _backward(structure: Structure, exact: bool) -> ca.Function:
     u_before, stages = ca.MX.sym("u_before", NU), ca.MX.sym("stages", structure.stage_size, N + 1)
     theta, damping = ca.MX.sym("theta", THETA_SIZE), ca.MX.sym("damping")
     multipliers = ca.MX.sym("multipliers", structure.inequalities, N + 1)
-    xs, us, data, lam = ca.horzsplit(X), ca.horzsplit(U), ca.horzsplit(stages), ca.horzsplit(multipliers)
+    xs, us, data, lam = (
+        ca.horzsplit(X),
+        ca.horzsplit(U),
+        ca.horzsplit(stages),
+        ca.horzsplit(multipliers),
+    )
     P, s, adjoint = last(xs[N], data[N], theta, lam[N])
     gains: List[ca.MX] = [None] * N
     step: List[ca.MX] = [None] * N
@@ -69,7 +92,9 @@ def _terminal_model(structure: Structure, exact: bool) -> ca.Function:
     P = ca.SX(NZ, NZ)
     P[:NX, :NX] = ca.hessian(ca.dot(w, r * r), s.x)[0] if exact else 2 * J.T @ (ca.diag(w) @ J)
     adjoint = ca.vertcat(gradient, ca.SX.zeros(NU))
-    return ca.Function("terminal_model", [s.x, s.stage, s.theta, s.multipliers], [_upper(P), adjoint, adjoint])
+    return ca.Function(
+        "terminal_model", [s.x, s.stage, s.theta, s.multipliers], [_upper(P), adjoint, adjoint]
+    )
 
 
 def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
@@ -96,7 +121,9 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
     held_high = ca.logic_and(s.u >= high - _ACTIVE_TOLERANCE, gradient < 0)
     free = 1 - ca.logic_or(held_low, held_high)
     # an input held by its rate follows the input before
-    by_rate = ca.logic_or(ca.logic_and(held_low, low > s.u_min), ca.logic_and(held_high, high < s.u_max))
+    by_rate = ca.logic_or(
+        ca.logic_and(held_low, low > s.u_min), ca.logic_and(held_high, high < s.u_max)
+    )
     H = ca.horzcat(ca.SX(NU, NX), ca.diag(by_rate))
     adjoint_before = cost_z + ca.vertcat(A.T @ adjoint[:NX], by_rate * gradient)
 
@@ -121,14 +148,27 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
     span = s.u_max - s.u_min
     violation = ca.mmax(ca.fabs(s.u - ca.fmin(ca.fmax(s.u - gradient * span**2, low), high)) / span)
     new_summary = ca.vertcat(
-        summary[0] + ca.dot(free * qu, step),  # qu is the gradient under the feedback of the later stages
+        summary[0]
+        + ca.dot(free * qu, step),  # qu is the gradient under the feedback of the later stages
         ca.fmax(summary[1], violation),
         summary[2] + NU - ca.sum1(free),
         ca.fmin(summary[3], ca.mmin(ca.vertcat(*pivots))),
     )
     return ca.Function(
         "stage_backward",
-        [s.x, s.u, s.u_before, s.stage, s.theta, s.multipliers, damping, P_half, value_gradient, adjoint, summary],
+        [
+            s.x,
+            s.u,
+            s.u_before,
+            s.stage,
+            s.theta,
+            s.multipliers,
+            damping,
+            P_half,
+            value_gradient,
+            adjoint,
+            summary,
+        ],
         [ca.densify(gains), step, _upper(P_before), s_before, adjoint_before, new_summary],
     )
 
@@ -136,22 +176,44 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
 def _forward(structure: Structure) -> ca.Function:
     N = structure.horizon
     s = Symbols(structure)
-    x_bar, u_bar, before_bar = ca.SX.sym("x_bar", NX), ca.SX.sym("u_bar", NU), ca.SX.sym("b_bar", NU)
+    x_bar, u_bar, before_bar = (
+        ca.SX.sym("x_bar", NX),
+        ca.SX.sym("u_bar", NU),
+        ca.SX.sym("b_bar", NU),
+    )
     K, step, alpha = ca.SX.sym("K", NU, NZ), ca.SX.sym("step", NU), ca.SX.sym("alpha")
     deviation = ca.vertcat(s.x - x_bar, s.u_before - before_bar)
     law = u_bar + alpha * step + K @ deviation
     low, high = input_bounds(structure, s)
     u = ca.fmin(ca.fmax(law, low), high)
-    outputs = [next_state(structure, s), _augmented_cost(structure, s, False), inequalities(structure, s)]
+    outputs = [
+        next_state(structure, s),
+        _augmented_cost(structure, s, False),
+        inequalities(structure, s),
+    ]
     x_next, cost, g = ca.substitute(outputs, [s.u], [u])
     inner = ca.Function(
         "stage_forward",
-        [s.x, s.u_before, x_bar, u_bar, before_bar, K, step, alpha, s.stage, s.theta, s.multipliers],
+        [
+            s.x,
+            s.u_before,
+            x_bar,
+            u_bar,
+            before_bar,
+            K,
+            step,
+            alpha,
+            s.stage,
+            s.theta,
+            s.multipliers,
+        ],
         [x_next, u, cost, ca.densify(g)],
     )
     g = inequalities(structure, s)
     last = ca.Function(
-        "terminal_cost", [s.x, s.stage, s.theta, s.multipliers], [_augmented_cost(structure, s, True), ca.densify(g)]
+        "terminal_cost",
+        [s.x, s.stage, s.theta, s.multipliers],
+        [_augmented_cost(structure, s, True), ca.densify(g)],
     )
 
     x0, u_before, length = ca.MX.sym("x0", NX), ca.MX.sym("u_before", NU), ca.MX.sym("alpha")
@@ -160,13 +222,28 @@ def _forward(structure: Structure) -> ca.Function:
     stages, theta = ca.MX.sym("stages", structure.stage_size, N + 1), ca.MX.sym("theta", THETA_SIZE)
     multipliers = ca.MX.sym("multipliers", structure.inequalities, N + 1)
     lam = ca.horzsplit(multipliers)
-    xs, us, data, ks = ca.horzsplit(X), ca.horzsplit(U), ca.horzsplit(stages), ca.horzsplit(gains, NZ)
+    xs, us, data, ks = (
+        ca.horzsplit(X),
+        ca.horzsplit(U),
+        ca.horzsplit(stages),
+        ca.horzsplit(gains, NZ),
+    )
     step_k = ca.horzsplit(steps)
     x, before, before_nominal, total = x0, u_before, u_before, 0
     X_new, U_new, G = [x0], [], []
     for k in range(N):
         x, u, cost, g = inner(
-            x, before, xs[k], us[k], before_nominal, ks[k], step_k[k], length, data[k], theta, lam[k]
+            x,
+            before,
+            xs[k],
+            us[k],
+            before_nominal,
+            ks[k],
+            step_k[k],
+            length,
+            data[k],
+            theta,
+            lam[k],
         )
         before, before_nominal, total = u, us[k], total + cost
         X_new.append(x)
@@ -207,7 +284,10 @@ def _symmetric(half: ca.SX) -> ca.SX:
 def _hessian(
     r: ca.SX, w: ca.SX, dynamics: Optional[ca.SX], z: ca.SX, u: ca.SX
 ) -> Tuple[ca.SX, ca.SX, ca.SX]:
-    """Return the blocks zz, uz, uu of the Hessian of w'r^2 (+ adjoint' F): exact, or Gauss-Newton without F."""
+    """Return the blocks zz, uz, uu of the Hessian of w'r^2 (+ adjoint' F).
+
+    Exact, or Gauss-Newton without F.
+    """
     if dynamics is not None:
         both = ca.vertcat(z, u)
         H = ca.hessian(ca.dot(w, r * r) + dynamics, both)[0]
@@ -217,7 +297,7 @@ def _hessian(
 
 
 def _cholesky(M: ca.SX) -> Tuple[ca.SX, List[ca.SX]]:
-    """Return the lower Cholesky factor of a small positive definite matrix, written out, and its squared pivots."""
+    """Return the lower Cholesky factor of a small matrix and its squared pivots."""
     n = M.shape[0]
     L, pivots = ca.SX(n, n), []
     for j in range(n):
@@ -231,7 +311,9 @@ def _cholesky(M: ca.SX) -> Tuple[ca.SX, List[ca.SX]]:
 def _forward_substitution(L: ca.SX, b: ca.SX) -> ca.SX:
     rows: List[ca.SX] = []
     for i in range(L.shape[0]):
-        rows.append((b[i, :] - sum((L[i, m] * rows[m] for m in range(i)), ca.SX(1, b.shape[1]))) / L[i, i])
+        rows.append(
+            (b[i, :] - sum((L[i, m] * rows[m] for m in range(i)), ca.SX(1, b.shape[1]))) / L[i, i]
+        )
     return ca.vertcat(*rows)
 
 
@@ -241,5 +323,7 @@ def _solve(L: ca.SX, b: ca.SX) -> ca.SX:
     n = L.shape[0]
     rows: List[ca.SX] = [None] * n
     for i in reversed(range(n)):
-        rows[i] = (y[i, :] - sum((L[m, i] * rows[m] for m in range(i + 1, n)), ca.SX(1, b.shape[1]))) / L[i, i]
+        rows[i] = (
+            y[i, :] - sum((L[m, i] * rows[m] for m in range(i + 1, n)), ca.SX(1, b.shape[1]))
+        ) / L[i, i]
     return ca.vertcat(*rows)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Angles and quaternions: scalar last (x, y, z, w), body FLU to world ENU, roll-pitch-yaw about x, y, z."""
+"""Angles and quaternions.
+
+Scalar last (x, y, z, w), body FLU to world ENU, roll-pitch-yaw about x, y, z.
+"""
 
 import math
 from typing import Sequence, Tuple
@@ -13,7 +16,7 @@ def wrap_angle(angle: float) -> float:
 
 
 def nearest_angle(angle: float, reference: float) -> float:
-    """Return the angle [rad] plus the multiple of 2 pi that brings it nearest to the reference [rad]."""
+    """Return the angle [rad] plus the multiple of 2 pi that is nearest to the reference [rad]."""
     return reference + wrap_angle(angle - reference)
 
 

@@ -70,7 +70,11 @@ def shift(guess: Guess, stages: float) -> Guess:
 
 
 def worst_violation(g: np.ndarray, kinds: Sequence[str], tolerance: float) -> Tuple[float, str]:
-    """Return the largest excess in the inequalities g (N + 1, nc) and its kind, 0 and "" within the tolerance."""
+    """Return the largest excess in g (N + 1, nc) and its kind, "" within the tolerance."""
     most = g.max(axis=0)
     row = int(np.argmax(most))
-    return (float(most[row]), kinds[row]) if most[row] > tolerance else (max(0.0, float(most[row])), "")
+    return (
+        (float(most[row]), kinds[row])
+        if most[row] > tolerance
+        else (max(0.0, float(most[row])), "")
+    )

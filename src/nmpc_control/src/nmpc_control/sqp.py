@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: MIT
 """The compiled backend: projected Gauss-Newton with Riccati sweeps, every iterate feasible.
 
-One iteration is a backward sweep (gradient, active bounds, Newton step with feedback; ``riccati``) and a
-rollout along it, shortened until the cost falls enough (Armijo), with Levenberg damping where no length
-helps. Because dynamics and bounds hold exactly at every iterate, the cost itself is the merit function and
-a solve cut off by its wall-time budget still returns a plan that can be flown. Inequalities beside the input bounds
-enter by an augmented Lagrangian whose multipliers, bounded by the weight of the L1 penalty, are updated whenever the
+One iteration is a backward sweep (gradient, active bounds, Newton step with feedback; ``riccati``)
+and a
+rollout along it, shortened until the cost falls enough (Armijo), with Levenberg damping where no
+length
+helps. Because dynamics and bounds hold exactly at every iterate, the cost itself is the merit
+function and
+a solve cut off by its wall-time budget still returns a plan that can be flown. Inequalities beside
+the input bounds
+enter by an augmented Lagrangian whose multipliers, bounded by the weight of the L1 penalty, are
+updated whenever the
 inner iteration has converged.
 """
 
@@ -28,18 +33,28 @@ _NEWTON_REGION = 0.02  # relative change of the cost below which the exact Hessi
 _LEAST_PIVOT = 1e-6
 _SHORTEST_STEP = 1.0 / 64.0
 _DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
-_DECREASE = 1e-3  # times tolerance: a smaller predicted change of the cost, relative, counts as none
+_DECREASE = (
+    1e-3  # times tolerance: a smaller predicted change of the cost, relative, counts as none
+)
 _SHOWN = 2e-3  # [m], [m/s] by which a softened bound must be exceeded to be reported
-_FIRST_ACCURACY = 1e-3  # predicted relative change of the cost at which the multipliers are first updated
+_FIRST_ACCURACY = (
+    1e-3  # predicted relative change of the cost at which the multipliers are first updated
+)
 _ROUNDING = 1e-9  # a smaller predicted change, relative, is rounding
 
 
 class SqpSolver:
     """Solver of one problem structure; call ``solve`` from one thread at a time."""
 
-    def __init__(self, structure: Structure, tolerance: float, max_iterations: int, time_budget: float) -> None:
+    def __init__(
+        self, structure: Structure, tolerance: float, max_iterations: int, time_budget: float
+    ) -> None:
         self.structure = structure
-        self.tolerance, self.max_iterations, self.time_budget = tolerance, max_iterations, time_budget
+        self.tolerance, self.max_iterations, self.time_budget = (
+            tolerance,
+            max_iterations,
+            time_budget,
+        )
         functions = compile_functions(sweeps(structure))
         self._arrays: Dict[str, np.ndarray] = {}
         self._backward = Buffered(functions["backward"], self._arrays)
@@ -81,7 +96,10 @@ class SqpSolver:
             new_cost = self._search(cost, slope)
             if new_cost is not None:
                 newton = cost - new_cost <= _NEWTON_REGION * (1.0 + abs(cost))
-                cost, damping = new_cost, damping / _DAMPING_FACTOR if damping > _DAMPING_FIRST else 0.0
+                cost, damping = (
+                    new_cost,
+                    damping / _DAMPING_FACTOR if damping > _DAMPING_FIRST else 0.0,
+                )
             elif slope > -_ROUNDING * (1.0 + abs(cost)) or damping >= _DAMPING_LAST:
                 status = "stalled"
                 break
@@ -105,7 +123,10 @@ class SqpSolver:
         )
 
     def _begin(self, guess: Optional[Guess], instance: Instance) -> float:
-        """Roll the guess out from x0; fall back to hover when that is not finite. Returns the cost."""
+        """Roll the guess out from x0.
+
+        Fall back to hover when that is not finite. Returns the cost.
+        """
         for candidate in (guess, cold_guess(instance.x0, self.structure.horizon)):
             if candidate is None or not np.all(np.isfinite(candidate.inputs)):
                 continue
@@ -129,13 +150,19 @@ class SqpSolver:
         return float(self._arrays["cost"][0, 0])
 
     def _objective(self, augmented: float, weight: float) -> float:
-        """Return the problem's own cost: tracking and potentials plus the L1 penalty on the inequalities."""
+        """Return the problem's own cost.
+
+        Tracking and potentials plus the L1 penalty on the inequalities.
+        """
         g, mu = self._inequalities, self._curvature
         excess = np.maximum(0.0, g + self._arrays["multipliers"] / mu)
         return float(augmented - np.sum(mu / 2 * excess**2) + weight * np.sum(np.maximum(0.0, g)))
 
     def _update_multipliers(self, weight: float) -> float:
-        """Move the multipliers by the inequalities at the iterate; returns the largest move, as an excess."""
+        """Move the multipliers by the inequalities at the iterate.
+
+        Returns the largest move, as an excess.
+        """
         old = self._arrays["multipliers"]
         new = np.clip(old + self._curvature * self._inequalities, 0.0, weight)
         moved = float(np.max(np.abs(new - old) / self._curvature))
@@ -143,9 +170,12 @@ class SqpSolver:
         return moved
 
     def _direction(self, damping: float, newton: bool) -> Tuple[float, float, int]:
-        """Compute step and gains; returns the slope along the step, projected gradient and active bounds.
+        """Compute step and gains.
 
-        Near a solution (``newton``) the exact Hessian converges fast; where it is not positive, Gauss-Newton is used.
+        Returns the slope along the step, projected gradient and active bounds.
+
+        Near a solution (``newton``) the exact Hessian converges fast; where it is not positive,
+        Gauss-Newton is used.
         """
         self._arrays["damping"][0, 0] = damping
         slope, residual, active, pivot = 0.0, np.inf, 0, 0.0
@@ -158,7 +188,10 @@ class SqpSolver:
         return slope, residual, active
 
     def _search(self, cost: float, slope: float) -> Optional[float]:
-        """Take the longest of the tried steps that lowers the cost enough; None when there is none."""
+        """Take the longest of the tried steps that lowers the cost enough.
+
+        None when there is none.
+        """
         alpha = 1.0
         while alpha >= _SHORTEST_STEP:
             self._arrays["alpha"][0, 0] = alpha

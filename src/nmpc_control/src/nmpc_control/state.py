@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Order and meaning of states and inputs (paper, Eqs. 4a and 4b), and the data that flows between modules.
+"""Order and meaning of states and inputs (paper, Eqs.
+
+4a and 4b), and the data that flows between modules.
 
 State (10): position [m], roll, pitch, yaw [rad], velocity [m/s], all in the ENU world frame, and
-yaw rate [rad/s]. Input (4): mass-normalised thrust [m/s^2], roll and pitch references [rad], yaw rate
+yaw rate [rad/s]. Input (4): mass-normalised thrust [m/s^2], roll and pitch references [rad], yaw
+rate
 reference [rad/s]; body frame FLU, so positive pitch is nose down.
 """
 
@@ -52,7 +55,8 @@ class Goal(IntEnum):
 class Plan:
     """One solution of the optimal control problem; ``found`` False when there is none.
 
-    ``inputs[k]`` is to be commanded from ``t + k * dt``; ``states[k]`` is what the telemetry shows at
+    ``inputs[k]`` is to be commanded from ``t + k * dt``; ``states[k]`` is what the telemetry shows
+    at
     ``t + delay + k * dt``.
     """
 
@@ -84,7 +88,7 @@ class Plan:
         return self.inputs[k]
 
     def state_at(self, t: float) -> np.ndarray:
-        """Return the state (10,) expected in the telemetry at time ``t`` [s], linear between stages."""
+        """Return the state (10,) that the telemetry should show at ``t`` [s]."""
         s = float(np.clip((t - self.t - self.delay) / self.dt, 0.0, self.horizon))
         k = min(int(s), self.horizon - 1)
         return self.states[k] + (s - k) * (self.states[k + 1] - self.states[k])
@@ -96,7 +100,9 @@ class Obstacle:
 
     id: str
     position: np.ndarray  # (3,) [m] centre, world frame
-    size: np.ndarray  # [m] sphere: (radius,), cylinder: (radius, height), box: (3,) full edge lengths
+    size: (
+        np.ndarray
+    )  # [m] sphere: (radius,), cylinder: (radius, height), box: (3,) full edge lengths
     shape: str = "sphere"
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) [m/s]
     stamp: Optional[float] = None  # [s] time of the position; None: it stands still
@@ -114,7 +120,10 @@ class Obstacle:
             return np.linalg.norm(offset, axis=-1) - self.size[0]
         if self.shape == "cylinder":
             q = np.stack(
-                [np.linalg.norm(offset[..., :2], axis=-1) - self.size[0], np.abs(offset[..., 2]) - self.size[1] / 2],
+                [
+                    np.linalg.norm(offset[..., :2], axis=-1) - self.size[0],
+                    np.abs(offset[..., 2]) - self.size[1] / 2,
+                ],
                 axis=-1,
             )
         else:

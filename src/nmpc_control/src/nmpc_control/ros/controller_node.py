@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""ROS node nmpc_controller: estimates, samples the reference, solves, publishes plans; never commands the aircraft.
+"""ROS node nmpc_controller: estimates, samples the reference, solves, publishes plans.
+
+Never commands the aircraft.
 
 ROS Subscribers:
     dji_sdk/attitude, dji_sdk/imu, dji_sdk/velocity, dji_sdk/local_position: the state.
@@ -10,7 +12,8 @@ ROS Subscribers:
 ROS Action: fly_trajectory (nmpc_msgs/FlyTrajectory).
 ROS Publishers: see ``publishers``.
 ROS Parameters:
-    ~vehicle (str): file under config/vehicles. ~weights (str): weight preset, default the scenario's own.
+    ~vehicle (str): file under config/vehicles. ~weights (str): weight preset, default the
+    scenario's own.
     ~scenario (str): name or path of a scenario that is offered beside the named ones.
     ~backend (str): compiled or ipopt. ~avoidance (bool): false removes the obstacle term.
     ~frame_id (str): world frame. ~base_frame (str): body frame.
@@ -26,9 +29,11 @@ from typing import Callable, Deque, Dict, Optional, Sequence, Tuple
 import numpy as np
 import rospy
 from geometry_msgs.msg import PointStamped, PoseStamped, QuaternionStamped, Vector3Stamped
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Empty
+
 from nmpc_control.controller import Controller
 from nmpc_control.errors import NmpcError
-
 from nmpc_control.params import Parameters, load_parameters, load_weights
 from nmpc_control.ros.conversions import MessageError, obstacles_from_msg
 from nmpc_control.ros.publishers import Publishers
@@ -36,12 +41,13 @@ from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
 from nmpc_control.rotations import rpy_from_quaternion
 from nmpc_control.scenario import Scenario, load_scenario
 from nmpc_control.state import POSITION, YAW, Goal, Obstacle
-from sensor_msgs.msg import Imu
-from std_msgs.msg import Empty
-
 from nmpc_msgs.msg import ControllerStatus, ObstacleArray
 
-_ENGAGED = (ControllerStatus.MODE_FLYING, ControllerStatus.MODE_HOVERING, ControllerStatus.MODE_BRAKING)
+_ENGAGED = (
+    ControllerStatus.MODE_FLYING,
+    ControllerStatus.MODE_HOVERING,
+    ControllerStatus.MODE_BRAKING,
+)
 _FARTHEST_GOAL = 1000.0  # [m] from the origin; a pose beyond it is a mistake
 
 
@@ -68,7 +74,10 @@ class ControllerNode:
             self._show(self._offered)
 
     def run(self) -> None:
-        """Solve at the controller's rate until shutdown; a failed tick is reported and the next one tried."""
+        """Solve at the controller's rate until shutdown.
+
+        A failed tick is reported and the next one tried.
+        """
         self.action.start()
         self._subscribe()
         rate = rospy.Rate(self.parameters.solver.budget.rate)
@@ -160,7 +169,9 @@ class ControllerNode:
         target = np.array([p.x, p.y, p.z])
         estimate = self.controller.estimator.estimate(t)
         if pose.header.frame_id not in ("", self.frame_id):
-            rospy.logwarn(f"command/pose refused: frame {pose.header.frame_id!r}, expected {self.frame_id!r}")
+            rospy.logwarn(
+                f"command/pose refused: frame {pose.header.frame_id!r}, expected {self.frame_id!r}"
+            )
         elif not np.all(np.isfinite(target)) or np.linalg.norm(target) > _FARTHEST_GOAL:
             rospy.logwarn("command/pose refused: position is not finite or too far away")
         elif estimate is None or not self.controller.engaged:
@@ -179,7 +190,9 @@ class ControllerNode:
             rospy.logwarn_throttle(1.0, "more requests than can be served: one dropped")
 
     def _join_obstacles(self) -> None:
-        joined = {obstacle.id: obstacle for obstacle in (self.scenario.obstacles if self.scenario else ())}
+        joined = {
+            obstacle.id: obstacle for obstacle in (self.scenario.obstacles if self.scenario else ())
+        }
         joined.update(self._heard)
         self.controller.obstacles = tuple(joined.values())
         self.publishers.obstacles(self.controller.obstacles)
@@ -197,10 +210,14 @@ class ControllerNode:
             self.controller.estimator.add_imu(m.header.stamp.to_sec(), (w.x, w.y, w.z))
 
         def on_velocity(m: Vector3Stamped) -> None:
-            self.controller.estimator.add_velocity(m.header.stamp.to_sec(), (m.vector.x, m.vector.y, m.vector.z))
+            self.controller.estimator.add_velocity(
+                m.header.stamp.to_sec(), (m.vector.x, m.vector.y, m.vector.z)
+            )
 
         def on_position(m: PointStamped) -> None:
-            self.controller.estimator.add_position(m.header.stamp.to_sec(), (m.point.x, m.point.y, m.point.z))
+            self.controller.estimator.add_position(
+                m.header.stamp.to_sec(), (m.point.x, m.point.y, m.point.z)
+            )
 
         def on_status(m: ControllerStatus) -> None:
             self.controller.engaged = m.mode in _ENGAGED
@@ -219,16 +236,26 @@ class ControllerNode:
         listen("dji_sdk/velocity", Vector3Stamped, on_velocity)
         listen("dji_sdk/local_position", PointStamped, on_position)
         listen("nmpc/status", ControllerStatus, on_status, queue_size=10)
-        listen("nmpc/hold_request", Empty, lambda m: self._request(lambda t: self._hold(t, "told to hold")))
+        listen(
+            "nmpc/hold_request",
+            Empty,
+            lambda m: self._request(lambda t: self._hold(t, "told to hold")),
+        )
         listen("obstacles", ObstacleArray, on_obstacles)
         listen("command/pose", PoseStamped, lambda m: self._request(lambda t: self._go_to(t, m)))
 
 
 def load_node_parameters() -> Parameters:
     """Return the parameters that the private ROS parameters select; raises ConfigError."""
-    parameters = load_parameters(rospy.get_param("~vehicle", "dji_hil"), rospy.get_param("~weights", "") or "outdoor")
-    solver = replace(parameters.solver, backend=rospy.get_param("~backend", parameters.solver.backend))
-    avoidance = replace(parameters.avoidance, enabled=rospy.get_param("~avoidance", parameters.avoidance.enabled))
+    parameters = load_parameters(
+        rospy.get_param("~vehicle", "dji_hil"), rospy.get_param("~weights", "") or "outdoor"
+    )
+    solver = replace(
+        parameters.solver, backend=rospy.get_param("~backend", parameters.solver.backend)
+    )
+    avoidance = replace(
+        parameters.avoidance, enabled=rospy.get_param("~avoidance", parameters.avoidance.enabled)
+    )
     return replace(parameters, solver=solver, avoidance=avoidance)
 
 

@@ -86,7 +86,9 @@ class GuardNode:
             except rospy.ROSInterruptException:
                 break
             if time.monotonic() - ticked > OVERSLEPT:
-                time.sleep(CATCH_UP)  # what came meanwhile waits in the sockets: hear it, then judge
+                time.sleep(
+                    CATCH_UP
+                )  # what came meanwhile waits in the sockets: hear it, then judge
             ticked = time.monotonic()
 
     def _tick(self, now: rospy.Time) -> None:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What nmpc_controller publishes.
 
-ROS Publishers: nmpc/plan, nmpc/prediction (every other plan), nmpc/reference, nmpc/odometry, and latched
+ROS Publishers: nmpc/plan, nmpc/prediction (every other plan), nmpc/reference, nmpc/odometry, and
+latched
 nmpc/trajectory, nmpc/obstacles, nmpc/room; tf world -> base_link; /diagnostics.
 """
 
@@ -24,6 +25,9 @@ from geometry_msgs.msg import (
     Vector3,
 )
 from nav_msgs.msg import Odometry
+from std_msgs.msg import Header
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
 from nmpc_control.controller import Step
 from nmpc_control.ros.conversions import (
     obstacles_to_msg,
@@ -34,9 +38,6 @@ from nmpc_control.ros.conversions import (
 from nmpc_control.rotations import quaternion_from_rpy
 from nmpc_control.scenario import Scenario
 from nmpc_control.state import POSITION, YAW, Obstacle
-from std_msgs.msg import Header
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
-
 from nmpc_msgs.msg import ObstacleArray, Plan, Prediction
 
 _SAMPLE_PERIOD = 0.05  # [s] of the published trajectory
@@ -52,7 +53,9 @@ class Publishers:
         self._prediction = rospy.Publisher("nmpc/prediction", Prediction, queue_size=1)
         self._reference = rospy.Publisher("nmpc/reference", PoseStamped, queue_size=10)
         self._odometry = rospy.Publisher("nmpc/odometry", Odometry, queue_size=10)
-        self._trajectory = rospy.Publisher("nmpc/trajectory", MultiDOFJointTrajectory, queue_size=1, latch=True)
+        self._trajectory = rospy.Publisher(
+            "nmpc/trajectory", MultiDOFJointTrajectory, queue_size=1, latch=True
+        )
         self._obstacles = rospy.Publisher("nmpc/obstacles", ObstacleArray, queue_size=1, latch=True)
         self._room = rospy.Publisher("nmpc/room", PolygonStamped, queue_size=1, latch=True)
         self._transforms = tf2_ros.TransformBroadcaster()
@@ -87,20 +90,29 @@ class Publishers:
         self._updater.update()
 
     def trajectory(self, scenario: Scenario, clock_start: Optional[float]) -> None:
-        """Publish the whole reference; its stamp is the start of its clock, 0 while that has not begun."""
+        """Publish the whole reference.
+
+        Its stamp is the start of its clock, 0 while that has not begun.
+        """
         trajectory = scenario.trajectory
         count = int(np.clip(np.ceil(trajectory.duration / _SAMPLE_PERIOD) + 1, 2, _MOST_SAMPLES))
         times = np.linspace(0.0, trajectory.duration, count)
         sample = trajectory.sample(times)
         message = MultiDOFJointTrajectory(joint_names=[scenario.name])
         message.header.frame_id = self.frame_id
-        message.header.stamp = rospy.Time(0) if clock_start is None else rospy.Time.from_sec(clock_start)
+        message.header.stamp = (
+            rospy.Time(0) if clock_start is None else rospy.Time.from_sec(clock_start)
+        )
         for i, t in enumerate(times):
-            pose = Transform(Vector3(*sample.position[i]), Quaternion(*quaternion_from_rpy(0, 0, sample.yaw[i])))
+            pose = Transform(
+                Vector3(*sample.position[i]), Quaternion(*quaternion_from_rpy(0, 0, sample.yaw[i]))
+            )
             velocity = Twist(Vector3(*sample.velocity[i]), Vector3(0, 0, sample.yaw_rate[i]))
             acceleration = Twist(linear=Vector3(*sample.acceleration[i]))
             message.points.append(
-                MultiDOFJointTrajectoryPoint([pose], [velocity], [acceleration], rospy.Duration.from_sec(t))
+                MultiDOFJointTrajectoryPoint(
+                    [pose], [velocity], [acceleration], rospy.Duration.from_sec(t)
+                )
             )
         self._trajectory.publish(message)
 

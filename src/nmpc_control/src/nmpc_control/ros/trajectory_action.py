@@ -1,26 +1,39 @@
 # SPDX-License-Identifier: MIT
-"""The action fly_trajectory: goals in, feedback and result out, all from the control loop's thread."""
+"""The action fly_trajectory.
+
+Goals in, feedback and result out, all from the control loop's thread.
+"""
 
 from typing import Callable, List, Optional
 
 import actionlib
 import numpy as np
+
 from nmpc_control.controller import Step
 from nmpc_control.errors import NmpcError
 from nmpc_control.itinerary import Itinerary
 from nmpc_control.scenario import Scenario, load_scenario, scenario_from_waypoints
 from nmpc_control.state import Goal
-
-from nmpc_msgs.msg import FlyTrajectoryAction, FlyTrajectoryFeedback, FlyTrajectoryGoal, FlyTrajectoryResult
+from nmpc_msgs.msg import (
+    FlyTrajectoryAction,
+    FlyTrajectoryFeedback,
+    FlyTrajectoryGoal,
+    FlyTrajectoryResult,
+)
 
 _FEEDBACK_PERIOD = 0.2  # [s]
 
 
 class TrajectoryAction:
-    """Server of fly_trajectory; ``on_goal`` and ``on_cancel`` are called from ROS threads and only notify."""
+    """Server of fly_trajectory.
+
+    ``on_goal`` and ``on_cancel`` are called from ROS threads and only notify.
+    """
 
     def __init__(self, on_goal: Callable[[], None], on_cancel: Callable[[], None]) -> None:
-        self._server = actionlib.SimpleActionServer("fly_trajectory", FlyTrajectoryAction, auto_start=False)
+        self._server = actionlib.SimpleActionServer(
+            "fly_trajectory", FlyTrajectoryAction, auto_start=False
+        )
         self._server.register_goal_callback(on_goal)
         self._server.register_preempt_callback(on_cancel)
         self._deviations: List[float] = []
@@ -101,7 +114,9 @@ def scenario_of(goal: FlyTrajectoryGoal, offered: Optional[Scenario]) -> Scenari
         raise NmpcError(f"speed: got {goal.speed}, expected a finite number >= 0 [m/s]")
     speed = goal.speed if goal.speed > 0 else None
     if not goal.scenario:
-        return scenario_from_waypoints(np.array([[p.x, p.y, p.z] for p in goal.waypoints]).reshape(-1, 3), speed)
+        return scenario_from_waypoints(
+            np.array([[p.x, p.y, p.z] for p in goal.waypoints]).reshape(-1, 3), speed
+        )
     if offered and goal.scenario == offered.name and speed is None:
         return offered
     if "/" in goal.scenario or goal.scenario.endswith((".yaml", ".yml")):

@@ -1,1 +1,4 @@
-"""Controller, guard and simulated aircraft together: flights without ROS, and the command that flies with it."""
+"""Controller, guard and simulated aircraft together.
+
+Flights without ROS, and the command that flies with it.
+"""

@@ -4,11 +4,11 @@
 from typing import Dict, List, Tuple
 
 import numpy as np
+
 from nmpc_control import dji
 from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Reference, Series
 from nmpc_control.scenario import Scenario
 from nmpc_control.state import POSITION, VELOCITY, Obstacle
-
 from uav_sim.closed_loop.loop import Log
 from uav_sim.world import World
 
@@ -48,14 +48,14 @@ def record_of(scenario: Scenario, log: Log, collisions: int) -> FlightRecord:
 
 
 def _command(axes: dji.Axes) -> Tuple[float, float, float, float]:
-    """Return thrust [percent], roll, pitch [rad], yaw rate [rad/s] of setpoint axes, NaN where not given."""
+    """Return thrust [percent], roll, pitch [rad], yaw rate [rad/s]; NaN where not given."""
     if axes[4] != dji.ATTITUDE_THRUST:
         return (np.nan, np.nan, np.nan, axes[3])
     return (axes[2], axes[0], axes[1], axes[3])
 
 
 def world_of(scenario: Scenario, radius: float) -> World:
-    """Return the simulator's own world with the scenario's obstacles around a hull of a radius [m]."""
+    """Return the simulator's own world of a scenario, for a hull of a radius [m]."""
     return World.from_list(
         [_entry(obstacle) for obstacle in scenario.obstacles], radius, scenario.name
     )

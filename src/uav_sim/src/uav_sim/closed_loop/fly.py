@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Fly one scenario in the simulator through ROS, record it, and say how it went.
 
-Starts a ROS master of its own (or none of yours: the port is free), simulator, controller, guard, markers and
-recorder; an operator then starts, flies and lands. Leaves ``<scenario>_<time>.bag`` with ``.json``, figures and report.
+Starts a ROS master of its own (or none of yours: the port is free), simulator, controller, guard,
+markers and
+recorder; an operator then starts, flies and lands. Leaves ``<scenario>_<time>.bag`` with ``.json``,
+figures and report.
 """
 
 import argparse
@@ -19,7 +21,6 @@ from xmlrpc.client import ServerProxy
 
 from nmpc_control.errors import NmpcError
 from nmpc_control.scenario import Scenario, load_scenario, scenario_path
-
 from uav_sim.errors import SimulatorError
 from uav_sim.preset import load_preset
 
@@ -29,7 +30,10 @@ _STOP_TIMEOUT = 20.0  # [s] wall time for roslaunch to end its nodes
 
 
 def main(argv: Optional[List[str]] = None) -> None:
-    """Entry point of ``rosrun uav_sim fly``; exit status 0 only if the flight arrived and hit nothing."""
+    """Entry point of ``rosrun uav_sim fly``.
+
+    Exit status 0 only if the flight arrived and hit nothing.
+    """
     options = _parser().parse_args(argv)
     try:
         scenario = load_scenario(options.scenario)
@@ -75,7 +79,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--bags", type=Path, default=Path("bags"), help="folder for bag, JSON and report"
     )
-    parser.add_argument("--port", type=int, default=0, help="of the ROS master (default: 11311 if free, else any)")
+    parser.add_argument(
+        "--port", type=int, default=0, help="of the ROS master (default: 11311 if free, else any)"
+    )
     parser.add_argument("--rviz", action="store_true", help="open RViz")
     return parser
 
@@ -100,10 +106,8 @@ def _fly(options: argparse.Namespace, scenario: Scenario, bag: Path) -> int:
         f"bag:={bag.resolve()}",
         f"rviz:={str(options.rviz).lower()}",
     ]
-    log = bag.with_suffix(".log")
-    _say(
-        f"flying {scenario.name} on {options.plant}, ROS_MASTER_URI={environment['ROS_MASTER_URI']}, log {log}"
-    )
+    log, master = bag.with_suffix(".log"), environment["ROS_MASTER_URI"]
+    _say(f"flying {scenario.name} on {options.plant}, ROS_MASTER_URI={master}, log {log}")
     with open(log, "w", encoding="utf-8") as output:
         nodes = subprocess.Popen(
             launch, stdout=output, stderr=output, env=environment, start_new_session=True
@@ -131,7 +135,10 @@ def _fly(options: argparse.Namespace, scenario: Scenario, bag: Path) -> int:
 
 
 def _wait_for_simulated_time(nodes: "subprocess.Popen[bytes]", master_uri: str) -> None:
-    """Return when the master knows that time is simulated: a node that starts earlier would use wall time."""
+    """Return when the master knows that time is simulated.
+
+    A node that starts earlier would use wall time.
+    """
     master = ServerProxy(master_uri)
     deadline = time.monotonic() + _MASTER_TIMEOUT
     while nodes.poll() is None and time.monotonic() < deadline:

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Controller, guard and simulated aircraft on one simulated clock, without ROS and faster than real time."""
+"""Controller, guard and simulated aircraft on one clock, without ROS."""
 
 from dataclasses import dataclass, field
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import numpy as np
+
 from nmpc_control.controller import Controller, Step
 from nmpc_control.guard import Guard
 from nmpc_control.guard_data import Action, GuardOutput
@@ -13,7 +14,6 @@ from nmpc_control.guard_params import GuardParameters
 from nmpc_control.mode_inputs import STREAMING, Request
 from nmpc_control.params import Parameters
 from nmpc_control.scenario import Scenario
-
 from uav_sim.m100 import SimulatedM100, Truth
 from uav_sim.preset import PlantPreset
 from uav_sim.world import World
@@ -138,7 +138,8 @@ def fly(
     Args:
         scenario: what to fly; its obstacles are known to controller and guard.
         loop: aircraft and control, new.
-        approach: fly to the start and settle first; otherwise the clock starts as soon as automatic flight is on.
+        approach: fly to the start and settle first; otherwise the clock starts as soon as
+            automatic flight is on.
         on_progress: called with 0..1.
     """
     loop.aircraft.place(scenario.initial_position, yaw=scenario.start_yaw)

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Fly one scenario without ROS, faster than real time: controller, guard and simulated aircraft in one process.
+"""Fly one scenario without ROS, faster than real time.
 
-With ``--plant paper`` a scenario that has a variant ``paper`` is flown as in the paper's table of simulations (geometry,
+Controller, guard and simulated aircraft in one process.
+
+With ``--plant paper`` a scenario that has a variant ``paper`` is flown as in the paper's table of
+simulations (geometry,
 duration, start at rest, the paper's meaning of distance: from the aircraft's centre, no hull).
 """
 
@@ -12,6 +15,8 @@ import sys
 from pathlib import Path
 from typing import List, Optional, Tuple
 
+from rich.progress import Progress
+
 from nmpc_control.analysis.metrics import flight_metrics
 from nmpc_control.analysis.record import Metrics
 from nmpc_control.analysis.tables import as_text
@@ -20,8 +25,6 @@ from nmpc_control.errors import NmpcError
 from nmpc_control.guard_params import load_guard_parameters
 from nmpc_control.params import Parameters, load_parameters
 from nmpc_control.scenario import Scenario, load_scenario, scenario_path
-from rich.progress import Progress
-
 from uav_sim.closed_loop.flight_record import record_of, world_of
 from uav_sim.closed_loop.loop import ClosedLoop, fly
 from uav_sim.errors import SimulatorError
@@ -52,7 +55,8 @@ def simulate(scenario: Scenario, parameters: Parameters, plant: str, quiet: bool
 
     Args:
         scenario: what to fly.
-        parameters: of the controller; the vehicle's radius is the hull for avoidance, checks and metrics.
+        parameters: of the controller; the vehicle's radius is the hull for avoidance, checks
+            and metrics.
         plant: name of the plant preset.
         quiet: no progress bar.
 
@@ -73,7 +77,10 @@ def simulate(scenario: Scenario, parameters: Parameters, plant: str, quiet: bool
 
 
 def new_loop(scenario: Scenario, parameters: Parameters, plant: str) -> ClosedLoop:
-    """Return aircraft and control among a scenario's obstacles, before the flight; raises ConfigError."""
+    """Return aircraft and control among a scenario's obstacles, before the flight.
+
+    Raises ConfigError.
+    """
     world = world_of(scenario, parameters.vehicle.radius)
     return ClosedLoop(load_preset(plant), world, parameters, load_guard_parameters())
 

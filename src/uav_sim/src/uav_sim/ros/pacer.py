@@ -4,7 +4,8 @@
 import time
 from typing import Callable
 
-# [s] of simulated time that is caught up in one burst; the rest stays lost, or subscribers would see a clock
+# [s] of simulated time that is caught up in one burst; the rest stays lost, or subscribers would
+# see a clock
 # that runs ahead of the telemetry still in their sockets
 MAX_LAG = 0.03
 

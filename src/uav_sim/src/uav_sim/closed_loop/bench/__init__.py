@@ -1,1 +1,1 @@
-"""Measures the solver backends on problems recorded from closed loops, beside the paper's own formulation."""
+"""Measures the solver backends on recorded problems, beside the paper's own formulation."""

@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import Dict, List, Optional, Sequence
 
 import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
 from nmpc_control.ipopt import IpoptSolver
 from nmpc_control.ocp import Structure
 from nmpc_control.solution import Guess, Solution
 from nmpc_control.sqp import SqpSolver
 from nmpc_control.state import POSITION
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
-
 from uav_sim.closed_loop.bench.objective import Objective
 from uav_sim.closed_loop.bench.problem import Problem
 from uav_sim.closed_loop.bench.problems import KINDS, in_reach, recorded_problems

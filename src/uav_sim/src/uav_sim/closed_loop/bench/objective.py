@@ -5,7 +5,15 @@ from typing import Tuple
 
 import casadi as ca
 import numpy as np
-from nmpc_control.ocp import THETA_SIZE, Instance, Structure, Symbols, next_state, stage_cost
+
+from nmpc_control.ocp import (
+    THETA_SIZE,
+    Instance,
+    Structure,
+    Symbols,
+    next_state,
+    stage_cost,
+)
 from nmpc_control.state import NU, NX
 
 

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: MIT
 """Problems that the backends are compared on: recorded from closed loops, or drawn at random.
 
-While recording, a solver without wall-time budget flies, so that the problems do not depend on the machine's load.
+While recording, a solver without wall-time budget flies, so that the problems do not depend on the
+machine's load.
 """
 
 from dataclasses import replace
 from typing import Any, Dict, List, Optional, Tuple
 
 import numpy as np
+
 from nmpc_control.ocp import SLOT_SIZE, Structure
 from nmpc_control.params import Parameters, load_parameters
 from nmpc_control.scenario import Scenario, load_scenario
 from nmpc_control.sqp import SqpSolver
 from nmpc_control.state import NU, NX, POSITION
-
 from uav_sim.closed_loop.bench.problem import Problem, Recorder
 from uav_sim.closed_loop.bench.scenes import scatter
 from uav_sim.closed_loop.loop import ClosedLoop, Log, fly
@@ -83,10 +84,10 @@ def recorded_problems(count: int, seed: int = 0) -> Dict[str, List[Problem]]:
         parameters = load_parameters(PLANT, scenario.weights)
         solver = exact_solver(structure_of(parameters))
         recorder, _, _, pushed = record(scenario, parameters, solver, pushes_seed)
-        stride = round(parameters.solver.dt * parameters.flight.rate)
+        stride = round(parameters.solver.dt * parameters.solver.budget.rate)
         indices = np.arange(stride, len(recorder.instances))
         if pushed:
-            after = round(_AFTER_PUSH * parameters.flight.rate)
+            after = round(_AFTER_PUSH * parameters.solver.budget.rate)
             indices = np.concatenate([np.arange(i, i + after) for i in pushed])
         result[kind] = recorder.problems(kind, stride, _spread(indices, count))
     warm = result["hexagon"] + result["multi_obstacle"]

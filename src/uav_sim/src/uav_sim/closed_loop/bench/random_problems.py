@@ -7,11 +7,11 @@ They are scenes that can be flown: the hull passes between any two spheres, and 
 from typing import Dict, List, Sequence
 
 import numpy as np
+
 from nmpc_control.nmpc import Nmpc
 from nmpc_control.params import load_parameters
 from nmpc_control.scenario import Scenario, load_scenario
 from nmpc_control.state import NX, POSITION, VELOCITY, YAW, YAW_RATE, Obstacle, hover_input
-
 from uav_sim.closed_loop.bench.problem import Problem, Recorder
 from uav_sim.closed_loop.bench.problems import PLANT, exact_solver, structure_of
 

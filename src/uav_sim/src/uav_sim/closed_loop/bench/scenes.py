@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import List
 
 import numpy as np
+
 from nmpc_control.scenario import Scenario
 from nmpc_control.state import Obstacle
 
