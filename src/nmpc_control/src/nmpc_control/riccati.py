@@ -30,6 +30,13 @@ from nmpc_control.ocp import (
     input_bounds,
     next_state,
 )
+from nmpc_control.small_matrices import (
+    cholesky,
+    forward_substitution,
+    pack_symmetric,
+    solve,
+    unpack_symmetric,
+)
 from nmpc_control.state import NU, NX
 
 NZ = NX + NU  # state of the recursion: x and the input before
@@ -93,7 +100,9 @@ def _terminal_model(structure: Structure, exact: bool) -> ca.Function:
     P[:NX, :NX] = ca.hessian(ca.dot(w, r * r), s.x)[0] if exact else 2 * J.T @ (ca.diag(w) @ J)
     adjoint = ca.vertcat(gradient, ca.SX.zeros(NU))
     return ca.Function(
-        "terminal_model", [s.x, s.stage, s.theta, s.multipliers], [_upper(P), adjoint, adjoint]
+        "terminal_model",
+        [s.x, s.stage, s.theta, s.multipliers],
+        [pack_symmetric(P), adjoint, adjoint],
     )
 
 
@@ -103,7 +112,7 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
     P_half = ca.SX.sym("P", NZ * (NZ + 1) // 2)
     value_gradient, adjoint = ca.SX.sym("s", NZ), ca.SX.sym("adjoint", NZ)
     summary = ca.SX.sym("summary", 4)
-    P = _symmetric(P_half)
+    P = unpack_symmetric(P_half, NZ)
     Pxx, Pxu, Puu = P[:NX, :NX], P[:NX, NX:], P[NX:, NX:]
 
     x_next = next_state(structure, s)
@@ -136,11 +145,11 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
     qz = cost_z + ca.vertcat(A.T @ value_gradient[:NX], ca.SX.zeros(NU))
 
     F = ca.diag(free)
-    L, pivots = _cholesky(F @ (Quu + damping * ca.SX.eye(NU)) @ F + ca.diag(1 - free))
+    L, pivots = cholesky(F @ (Quu + damping * ca.SX.eye(NU)) @ F + ca.diag(1 - free))
     coupling = F @ (Quz + Quu @ H)
-    step = -_solve(L, free * qu)
-    gains = H - _solve(L, coupling)
-    half = _forward_substitution(L, coupling)
+    step = -solve(L, free * qu)
+    gains = H - solve(L, coupling)
+    half = forward_substitution(L, coupling)
     mixed = H.T @ Quz
     P_before = Qzz + mixed + mixed.T + H.T @ Quu @ H - half.T @ half
     s_before = qz + H.T @ qu + coupling.T @ step
@@ -169,7 +178,7 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
             adjoint,
             summary,
         ],
-        [ca.densify(gains), step, _upper(P_before), s_before, adjoint_before, new_summary],
+        [ca.densify(gains), step, pack_symmetric(P_before), s_before, adjoint_before, new_summary],
     )
 
 
@@ -265,22 +274,6 @@ def _augmented_cost(structure: Structure, s: Symbols, terminal: bool) -> ca.SX:
     return ca.dot(w, r * r)
 
 
-def _upper(P: ca.SX) -> ca.SX:
-    """Return the upper triangle of a symmetric matrix as one dense column, half the storage."""
-    return ca.densify(ca.vertcat(*[P[i, j] for j in range(NZ) for i in range(j + 1)]))
-
-
-def _symmetric(half: ca.SX) -> ca.SX:
-    P = ca.SX(NZ, NZ)
-    index = 0
-    for j in range(NZ):
-        for i in range(j + 1):
-            P[i, j] = half[index]
-            P[j, i] = half[index]
-            index += 1
-    return P
-
-
 def _hessian(
     r: ca.SX, w: ca.SX, dynamics: Optional[ca.SX], z: ca.SX, u: ca.SX
 ) -> Tuple[ca.SX, ca.SX, ca.SX]:
@@ -294,36 +287,3 @@ def _hessian(
         return H[:NZ, :NZ], H[NZ:, :NZ], H[NZ:, NZ:]
     Jz, Ju, W = ca.jacobian(r, z), ca.jacobian(r, u), ca.diag(w)
     return 2 * Jz.T @ (W @ Jz), 2 * Ju.T @ (W @ Jz), 2 * Ju.T @ (W @ Ju)
-
-
-def _cholesky(M: ca.SX) -> Tuple[ca.SX, List[ca.SX]]:
-    """Return the lower Cholesky factor of a small matrix and its squared pivots."""
-    n = M.shape[0]
-    L, pivots = ca.SX(n, n), []
-    for j in range(n):
-        pivots.append(M[j, j] - sum((L[j, i] ** 2 for i in range(j)), ca.SX(0)))
-        L[j, j] = ca.sqrt(pivots[j])
-        for i in range(j + 1, n):
-            L[i, j] = (M[i, j] - sum((L[i, m] * L[j, m] for m in range(j)), ca.SX(0))) / L[j, j]
-    return L, pivots
-
-
-def _forward_substitution(L: ca.SX, b: ca.SX) -> ca.SX:
-    rows: List[ca.SX] = []
-    for i in range(L.shape[0]):
-        rows.append(
-            (b[i, :] - sum((L[i, m] * rows[m] for m in range(i)), ca.SX(1, b.shape[1]))) / L[i, i]
-        )
-    return ca.vertcat(*rows)
-
-
-def _solve(L: ca.SX, b: ca.SX) -> ca.SX:
-    """Return (L L^T)^{-1} b."""
-    y = _forward_substitution(L, b)
-    n = L.shape[0]
-    rows: List[ca.SX] = [None] * n
-    for i in reversed(range(n)):
-        rows[i] = (
-            y[i, :] - sum((L[m, i] * rows[m] for m in range(i + 1, n)), ca.SX(1, b.shape[1]))
-        ) / L[i, i]
-    return ca.vertcat(*rows)

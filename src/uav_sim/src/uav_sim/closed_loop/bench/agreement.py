@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Does the compiled solver find what IPOPT finds? Both from the same start, IPOPT to a tight tolerance.
+"""Does the compiled solver find what IPOPT finds?
 
-Half of the problems are recorded from closed loops, half are drawn at random. A problem that the compiled solver ends
-with a higher cost is solved again by IPOPT from there: where that stays, it was another local minimum.
+Both solve from the same start, IPOPT to a tight tolerance. Half of the problems are recorded from
+closed loops, half are drawn at random. Where the compiled solver ends with a higher cost, IPOPT
+starts again from there: if that stays, it was another local minimum.
 """
 
 import argparse

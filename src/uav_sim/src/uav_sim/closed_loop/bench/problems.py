@@ -1,123 +1,63 @@
 # SPDX-License-Identifier: MIT
-"""Problems that the backends are compared on: recorded from closed loops, or drawn at random.
-
-While recording, a solver without wall-time budget flies, so that the problems do not depend on the
-machine's load.
-"""
+"""Problems on which the backends are compared, recorded from closed loops."""
 
 from dataclasses import replace
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Dict, List, Optional
 
 import numpy as np
 
-from nmpc_control.ocp import SLOT_SIZE, Structure
-from nmpc_control.params import Parameters, load_parameters
-from nmpc_control.scenario import Scenario, load_scenario
-from nmpc_control.sqp import SqpSolver
+from nmpc_control.ocp import SLOT_SIZE
+from nmpc_control.params import load_parameters
+from nmpc_control.scenario import load_scenario
 from nmpc_control.state import NU, NX, POSITION
-from uav_sim.closed_loop.bench.problem import Problem, Recorder
+from uav_sim.closed_loop.bench.problem import Problem
+from uav_sim.closed_loop.bench.recording import PLANT, exact_solver, record, structure_of
 from uav_sim.closed_loop.bench.scenes import scatter
-from uav_sim.closed_loop.loop import ClosedLoop, Log, fly
-from uav_sim.closed_loop.simulate import new_loop
 
-PLANT = "dji_hil"
 KINDS = ("hexagon", "multi_obstacle", "obstacles_32", "push", "cold_start")
 
-_PUSH = 3.0  # [m/s] sudden change of the velocity
-_PUSHES_AT = (0.15, 0.35, 0.55, 0.75)  # part of the trajectory's time
 _AFTER_PUSH = 2.0  # [s] of flight that counts as its consequence
-_JUMP = 5.0  # [m] sudden change of the position
+_JUMP = 5.0  # [m] sudden change of the position before a cold start
 
 
-def structure_of(parameters: Parameters) -> Structure:
-    """Return the structure of the problem that these parameters pose."""
-    p = parameters.solver
-    return Structure(p.horizon, p.dt, p.integrator, p.obstacle_slots)
-
-
-def exact_solver(structure: Structure, tolerance: float = 1e-3) -> SqpSolver:
-    """Return the compiled solver without budget."""
-    return SqpSolver(structure, tolerance, 200, 30.0)
-
-
-def record(
-    scenario: Scenario, parameters: Parameters, solver: Any, pushes_seed: Optional[int] = None
-) -> Tuple[Recorder, ClosedLoop, Log, List[int]]:
-    """Fly a scenario from its initial position.
+def recorded_problems(
+    count: int, seed: int = 0, until: Optional[float] = None
+) -> Dict[str, List[Problem]]:
+    """Return at most ``count`` problems of every kind, spread evenly over the flights.
 
     Args:
-        scenario: what to fly.
-        parameters: of the controller.
-        solver: what flies.
-        pushes_seed: of the directions in which the aircraft is pushed in mid-flight; None: it is not.
-
-    Returns:
-        What was posed and solved, the loop, its log, and the indices of the first problems after a push.
+        count: of each kind.
+        seed: of scattered spheres, pushes and jumps.
+        until: end the flights at this part of the trajectory's time.
     """
-    loop = new_loop(scenario, parameters, PLANT)
-    recorder = Recorder(solver)
-    loop.controller.nmpc.solver = recorder
-    rng, pushed = np.random.default_rng(pushes_seed), []
-
-    def push(progress: float) -> None:
-        due = pushes_seed is not None and len(pushed) < len(_PUSHES_AT)
-        if due and progress >= _PUSHES_AT[len(pushed)]:
-            direction = rng.normal(size=3) * [1.0, 1.0, 0.3]
-            plant = loop.aircraft.plant
-            plant.velocity = tuple(plant.velocity + _PUSH * direction / np.linalg.norm(direction))
-            pushed.append(len(recorder.instances))
-
-    log = fly(scenario, loop, on_progress=push)
-    return recorder, loop, log, pushed
-
-
-def recorded_problems(count: int, seed: int = 0) -> Dict[str, List[Problem]]:
-    """Return about ``count`` problems of every kind, spread evenly over the flights."""
-    result = {}
+    multi = load_scenario("multi_obstacle")
     flights = {
         "hexagon": (load_scenario("hexagon"), None),
-        "multi_obstacle": (load_scenario("multi_obstacle"), None),
-        "obstacles_32": (scatter(load_scenario("multi_obstacle"), 32, seed), None),
-        "push": (load_scenario("multi_obstacle"), seed),
+        "multi_obstacle": (multi, None),
+        "obstacles_32": (scatter(multi, 32, seed), None),
+        "push": (multi, seed),
     }
+    result = {}
     for kind, (scenario, pushes_seed) in flights.items():
         parameters = load_parameters(PLANT, scenario.weights)
         solver = exact_solver(structure_of(parameters))
-        recorder, _, _, pushed = record(scenario, parameters, solver, pushes_seed)
-        stride = round(parameters.solver.dt * parameters.solver.budget.rate)
-        indices = np.arange(stride, len(recorder.instances))
-        if pushed:
-            after = round(_AFTER_PUSH * parameters.solver.budget.rate)
-            indices = np.concatenate([np.arange(i, i + after) for i in pushed])
-        result[kind] = recorder.problems(kind, stride, _spread(indices, count))
+        flight = record(scenario, parameters, solver, pushes_seed, until)
+        rate = parameters.solver.budget.rate
+        stride = round(parameters.solver.dt * rate)
+        indices = np.arange(stride, len(flight.recorder.instances))
+        if flight.pushes:
+            after = round(_AFTER_PUSH * rate)
+            indices = np.concatenate([np.arange(i, i + after) for i in flight.pushes])
+            indices = indices[indices < len(flight.recorder.instances)]
+        result[kind] = flight.recorder.problems(kind, stride, _spread(indices, count))
     warm = result["hexagon"] + result["multi_obstacle"]
-    result["cold_start"] = cold_starts(
-        [warm[i] for i in _spread(np.arange(len(warm)), count)], seed
-    )
-    return result
-
-
-def cold_starts(problems: List[Problem], seed: int) -> List[Problem]:
-    """Return the problems after a jump of the position in a random direction, to be solved from hover."""
-    rng = np.random.default_rng(seed)
-    result = []
-    for problem in problems:
-        x0 = problem.instance.x0.copy()
-        while True:
-            direction = rng.normal(size=3) * [1.0, 1.0, 0.3]
-            x0[POSITION] = problem.instance.x0[POSITION] + _JUMP * direction / np.linalg.norm(
-                direction
-            )
-            if not in_reach(problem, x0[None, POSITION]):
-                break
-        result.append(
-            Problem("cold_start", problem.structure, replace(problem.instance, x0=x0), None)
-        )
+    chosen = [warm[i] for i in _spread(np.arange(len(warm)), count)]
+    result["cold_start"] = _cold_starts(chosen, seed)
     return result
 
 
 def in_reach(problem: Problem, positions: np.ndarray) -> bool:
-    """Return whether the potential of any obstacle acts at positions (1 or N + 1, 3)."""
+    """Return whether the potential of any obstacle acts at positions (M, 3) of stages 0..M-1."""
     slots = problem.instance.stages[NX + NU :].reshape(-1, SLOT_SIZE, problem.structure.horizon + 1)
     slots = slots[:, :, : len(positions)]
     offset = positions.T - slots[:, :3]
@@ -125,7 +65,22 @@ def in_reach(problem: Problem, positions: np.ndarray) -> bool:
     return bool(np.any(np.sqrt(squares) * slots[:, 4] < 1.0))
 
 
+def _cold_starts(problems: List[Problem], seed: int) -> List[Problem]:
+    """Return the problems after a jump in a random direction, to be solved from hover."""
+    rng = np.random.default_rng(seed)
+    result = []
+    for problem in problems:
+        x0 = problem.instance.x0.copy()
+        while True:
+            way = rng.normal(size=3) * [1.0, 1.0, 0.3]
+            x0[POSITION] = problem.instance.x0[POSITION] + _JUMP * way / np.linalg.norm(way)
+            if not in_reach(problem, x0[None, POSITION]):
+                break
+        instance = replace(problem.instance, x0=x0)
+        result.append(Problem("cold_start", problem.structure, instance, None))
+    return result
+
+
 def _spread(indices: np.ndarray, count: int) -> np.ndarray:
-    return indices[
-        np.unique(np.linspace(0, len(indices) - 1, min(count, len(indices))).round().astype(int))
-    ]
+    wanted = np.linspace(0, len(indices) - 1, min(count, len(indices)))
+    return indices[np.unique(wanted.round().astype(int))]

@@ -1,0 +1,125 @@
+"""Softened bounds hold where they can, and the way back is found where they cannot."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from problems import SPHERE, straight_reference, tight
+
+from nmpc_control.errors import ProblemError
+from nmpc_control.nmpc import Nmpc
+from nmpc_control.state import hover_input, hover_state
+
+EXCESS = 2e-3  # [m], [m/s]
+START = hover_state(np.array([0.0, 0.0, 5.0]))
+
+
+@pytest.fixture(scope="module", params=["compiled", "ipopt"])
+def nmpc(request) -> Nmpc:
+    optimiser = tight(request.param)
+    if request.param == "compiled":
+        optimiser.solver.tolerance = 1e-4
+    return optimiser
+
+
+def solve(nmpc: Nmpc, x0=START, obstacles=(), avoidance=None, **limits):
+    base = nmpc.parameters
+    changed = dataclasses.replace(
+        base,
+        limits=dataclasses.replace(base.limits, **limits),
+        avoidance=dataclasses.replace(base.avoidance, **(avoidance or {})),
+    )
+    nmpc.use(changed)
+    nmpc.reset()
+    try:
+        plan = nmpc.solve(0.0, x0, straight_reference(nmpc), hover_input(), obstacles)
+    finally:
+        nmpc.use(base)
+    assert plan.found
+    return plan, nmpc._last
+
+
+def test_the_speed_is_kept(nmpc):
+    free, _ = solve(nmpc)
+    bounded, solution = solve(nmpc, speed=1.7)
+    assert np.linalg.norm(free.states[:, 6:9], axis=1).max() > 1.9
+    assert np.linalg.norm(bounded.states[:, 6:9], axis=1).max() <= 1.7 + EXCESS
+    assert solution.softened == ""
+
+
+def test_the_fence_is_kept(nmpc):
+    fence = np.array([6.0, 1000.0, 1000.0])
+    bounded, solution = solve(nmpc, fence_max=fence)
+    assert bounded.states[:, 0].max() <= 6.0 + EXCESS
+    assert bounded.states[-1, 0] == pytest.approx(6.0, abs=0.05)
+    assert solution.softened == ""
+    assert solution.violation <= EXCESS
+
+
+def test_the_height_band_is_kept(nmpc):
+    x0 = START.copy()
+    x0[8] = 1.5  # climbing
+    free, _ = solve(nmpc, x0)
+    bounded, _ = solve(nmpc, x0, fence_max=np.array([1000.0, 1000.0, 5.25]))
+    assert free.states[:, 2].max() > 5.3
+    assert bounded.states[:, 2].max() <= 5.25 + EXCESS
+
+
+def test_the_input_rate_is_kept_from_the_input_before(nmpc):
+    rate = np.array([5.0, 0.6, 0.6, 0.6])
+    free, _ = solve(nmpc)
+    bounded, _ = solve(nmpc, input_rate=rate)
+    step = rate * nmpc.structure.dt
+
+    def changes(plan):
+        return np.abs(np.diff(np.vstack([hover_input(), plan.inputs]), axis=0))
+
+    assert np.any(changes(free) > 1.5 * step)
+    assert np.all(changes(bounded) <= step + 1e-6)
+
+
+def test_eq_7_is_kept_as_an_inequality(nmpc):
+    plan, solution = solve(nmpc, obstacles=(SPHERE,), avoidance={"term": "hard"})
+    margin = nmpc.parameters.avoidance.safety_distance + nmpc.parameters.avoidance.inflation
+    least = nmpc.parameters.vehicle.radius + margin
+    assert SPHERE.distance(plan.states[:, :3]).min() >= least - EXCESS
+    assert solution.softened == ""
+
+
+def test_outside_the_fence_the_way_back_is_found_and_reported(nmpc):
+    x0 = hover_state(np.array([0.0, 1.0, 5.0]))
+    plan, solution = solve(nmpc, x0, fence_max=np.array([1000.0, 0.5, 1000.0]))
+    excess = plan.states[:, 1] - 0.5
+    assert solution.softened == "fence"
+    assert solution.violation == pytest.approx(0.5, abs=0.02)
+    inside = int(np.argmax(excess <= 0.0))
+    assert 0 < inside < 15
+    assert np.all(np.diff(excess[:inside]) <= 0.0), "it never goes farther out"
+    assert excess[inside:].max() <= EXCESS
+
+
+def test_inside_the_margin_the_way_out_is_found_and_reported(nmpc):
+    x0 = hover_state(SPHERE.position + [0.0, -(0.6 + 1.0), 0.0])
+    plan, solution = solve(nmpc, x0, (SPHERE,), avoidance={"term": "hard"})
+    clearance = SPHERE.distance(plan.states[:, :3])
+    assert solution.softened == "obstacle"
+    assert clearance[-1] >= 1.2 - EXCESS
+    assert clearance.min() >= clearance[0] - 0.02
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        {"speed": 0.0},
+        {"fence_min": np.array([2000.0, 0.0, 0.0])},
+        {"input_rate": np.array([-1.0, 1.0, 1.0, 1.0])},
+        {"soft_weight": -1.0},
+        {"fence_max": np.array([np.nan, 1.0, 1.0])},
+    ],
+    ids=["no speed", "fence crossed", "negative rate", "negative weight", "NaN"],
+)
+def test_bounds_that_cannot_be_meant_are_refused(nmpc, limits):
+    base = nmpc.parameters
+    with pytest.raises(ProblemError):
+        nmpc.use(dataclasses.replace(base, limits=dataclasses.replace(base.limits, **limits)))
+    assert nmpc.parameters is base
