@@ -8,7 +8,7 @@ is_38() { "$1" -c 'import sys, venv; sys.exit(sys.version_info[:2] != (3, 8))' 2
 if is_38 .venv/bin/python3; then
   exit 0
 fi
-for interpreter in "$(command -v python3.8 || true)" "${PYENV_ROOT:-$HOME/.pyenv}"/versions/3.8*/bin/python3.8; do
+for interpreter in "$(command -v python3.8 || true)" "$(pyenv root 2>/dev/null || true)"/versions/3.8*/bin/python3.8; do
   if [ -x "$interpreter" ] && is_38 "$interpreter"; then
     .setup/python.sh .venv38 "$interpreter"
     echo "[test] core on $(.venv38/bin/python3 --version)"

@@ -86,9 +86,9 @@ class BSpline:
         condition = "natural" if ends == "natural" else None
         if closed and degree > 1:
             condition = "periodic"
-        spline = interpolate.make_interp_spline(
-            _sites(points, knots), points, degree, bc_type=condition
-        )
+        sites = _sites(points, knots)
+        vector = _not_a_knot(sites, degree) if condition is None else None
+        spline = interpolate.make_interp_spline(sites, points, degree, vector, condition)
         return cls(spline.t, spline.c, degree)
 
     @classmethod
@@ -188,6 +188,14 @@ def _checked_knots(knots: Sequence[float], n: int, degree: int) -> np.ndarray:
             "knots", knots, f"inner knots inside the ends, each at most {degree} times"
         )
     return (vector - vector[0]) / (vector[-1] - vector[0])
+
+
+def _not_a_knot(sites: np.ndarray, degree: int) -> np.ndarray:
+    """Return the knots at the inner sites, for even degrees midway (old SciPy: odd only)."""
+    inner = sites if degree % 2 else (sites[1:] + sites[:-1]) / 2.0
+    cut = (degree + 1) // 2
+    ends = np.ones(degree + 1)
+    return np.concatenate([sites[0] * ends, inner[cut:-cut], sites[-1] * ends])
 
 
 def _sites(points: np.ndarray, spacing: str) -> np.ndarray:
