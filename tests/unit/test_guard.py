@@ -77,8 +77,10 @@ def test_from_the_ground_to_hover_and_back():
     output = flight.tick(Request.LAND)
     assert output.answer == (True, "landing")
     assert output.actions == (Action.HOLD, Action.LAND)
-    assert (output.mode, output.axes) == (Mode.LANDING, None)
+    assert output.mode is Mode.LANDING
+    assert output.axes[4] == dji.VELOCITY, "held until DJI's own landing has begun"
     output = flight.tick()
+    assert output.axes is None
     assert output.actions == (Action.RELEASE_AUTHORITY,)
     assert output.mode is Mode.WAITING
     assert flight.run(0.5).mode is Mode.READY

@@ -76,6 +76,8 @@ def test_not_reaching_the_end_is_said(itinerary):
     assert itinerary.goal is Goal.HOLD
     assert not itinerary.outcome.arrived
     assert "not reached" in itinerary.outcome.message
+    held = itinerary.reference(np.array([t + 1.0]))[0, POSITION]
+    assert held == pytest.approx(START), "what was not reached is not chased"
 
 
 def test_passing_the_end_at_speed_is_no_arrival(itinerary):
@@ -91,7 +93,9 @@ def test_go_to_arrives_and_hold_interrupts(itinerary):
     follow(itinerary, 0.0, 15.0)
     assert itinerary.outcome.arrived
     assert itinerary.reference(np.array([20.0]))[0, YAW] == pytest.approx(1.0)
+    assert not itinerary.is_going_to(START)
     itinerary.go_to(20.0, START, 1.0, END, 1.0)
+    assert itinerary.is_going_to(END)
     itinerary.hold(START, 1.0)
     assert not itinerary.outcome.arrived
     assert itinerary.goal is Goal.HOLD

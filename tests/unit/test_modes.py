@@ -260,7 +260,7 @@ def test_gps_may_be_bad_where_the_position_comes_from_elsewhere():
         (Mode.LANDING, Request.HOVER, False, "not in flight: landing"),
         (Mode.BRAKING, Request.LAND, True, "landing"),
         (Mode.WAITING, Request.LAND, False, "not in flight: waiting"),
-        (Mode.FLYING, Request.RELEASE, True, "given back"),
+        (Mode.FLYING, Request.RELEASE, True, "giving authority back"),
         (Mode.MANUAL, Request.RELEASE, False, "nothing held: manual"),
     ],
 )

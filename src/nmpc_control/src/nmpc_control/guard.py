@@ -183,7 +183,7 @@ class Guard:
         if after not in STREAMING:
             self.ladder.stop_expecting()
         if after is not before:
-            if after is Mode.BRAKING:
+            if after in (Mode.BRAKING, Mode.LANDING):
                 self._brake.begin(self._input_before(i))
             self._enter(after, i.t, transition.reason)
         if self._wants_reference(i.t, seen):
@@ -211,7 +211,9 @@ class Guard:
             plan = self.ladder.plan
             up = float(plan.state_at(i.t + plan.delay)[VELOCITY][2])
             return _Command(rung, *self._axes(plan.input_at(i.t), up))
-        if self.mode is not Mode.BRAKING:
+        # until DJI's own landing has begun: silence while a service call blocks is nobody's control
+        awaits_landing = self.mode is Mode.LANDING and seen.in_air
+        if self.mode is not Mode.BRAKING and not awaits_landing:
             return _Command(Rung.RELEASE if self.mode is Mode.RELEASED else Rung.NONE)
         has_position = seen.position_age <= self.params.modes.position_timeout
         has_velocity = seen.velocity_age <= self.params.modes.velocity_timeout

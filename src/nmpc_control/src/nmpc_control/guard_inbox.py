@@ -26,6 +26,7 @@ class GuardInbox:
         self.request: Optional[Request] = None
         self._switch = params.rc_switch
         self._rc: Tuple[float, Sequence[float]] = (-math.inf, ())
+        self._left_f: Optional[dji.RcMode] = None  # since the last tick, however briefly
         self._status: Tuple[float, int] = (-math.inf, 0)
         self._gps: Tuple[float, int] = (-math.inf, 0)
         self._battery: Tuple[float, float] = (-math.inf, math.nan)
@@ -36,6 +37,9 @@ class GuardInbox:
     def add_rc(self, t: float, axes: Sequence[float]) -> None:
         """Take the axes of ``dji_sdk/rc``."""
         self._rc = (t, tuple(axes))
+        mode = dji.rc_mode(axes, self._switch)
+        if mode is not dji.RcMode.F:
+            self._left_f = mode
 
     def add_flight_status(self, t: float, value: int) -> None:
         """Take a value of ``dji_sdk/flight_status``."""
@@ -70,7 +74,7 @@ class GuardInbox:
             velocity_age=e.age("velocity", t),
             position_age=e.age("position", t),
             rc_age=t - rc_t,
-            rc=dji.rc_mode(rc, self._switch),
+            rc=self._left_f or dji.rc_mode(rc, self._switch),
             sticks=dji.stick_deflection(rc),
             status_age=t - self._status[0],
             flight_status=dji.flight_status(self._status[1]),
@@ -84,4 +88,5 @@ class GuardInbox:
         )
         (plan, goal), error = self._plan or (None, Goal.HOLD), self._plan_error
         self._plan, self._plan_error, self.failure, self.request = None, "", "", None
+        self._left_f = None
         return GuardInputs(t, telemetry, estimate, self._height, plan, error, goal, self.obstacles)

@@ -60,6 +60,11 @@ class Itinerary:
         self.goal, self.outcome = Goal.TRAJECTORY, None
         self.trajectory, self.clock_start = trajectory, t
 
+    def is_going_to(self, target: np.ndarray) -> bool:
+        """Return whether a target (3,) [m] is what ``go_to`` is under way to."""
+        on_leg = self.goal is Goal.APPROACH and self.trajectory is None
+        return on_leg and bool(np.linalg.norm(self._target() - target) < 1e-3)
+
     def update(self, t: float, position: np.ndarray, velocity: np.ndarray) -> None:
         """Move on with the position (3,) [m] and velocity (3,) [m/s] at time ``t`` [s]."""
         if self.goal is Goal.HOLD:
@@ -68,14 +73,12 @@ class Itinerary:
         near = np.linalg.norm(position - target) < self.flight.arrival_distance
         at_rest = near and np.linalg.norm(velocity) < self.flight.arrival_speed
         if self.goal is Goal.APPROACH:
-            self._update_approach(t, bool(at_rest))
+            self._update_approach(t, position, bool(at_rest))
         elif t >= self.clock_start + self.trajectory.duration:
             if at_rest:
                 self._finish("arrived")
             elif t > self.clock_start + self.trajectory.duration + self.flight.arrival_timeout:
-                self._finish(
-                    "the trajectory's time is over, its end was not reached", arrived=False
-                )
+                self._give_up(t, position, "the trajectory's time is over, its end was not reached")
 
     def reference(self, times: np.ndarray) -> np.ndarray:
         """Return the reference states (M, 10) at times (M,) [s]; roll and pitch are zero."""
@@ -126,12 +129,12 @@ class Itinerary:
         path = self._leg if self.goal is Goal.APPROACH else self.trajectory
         return path.sample(np.array([path.duration])).position[0]
 
-    def _update_approach(self, t: float, at_rest: bool) -> None:
+    def _update_approach(self, t: float, position: np.ndarray, at_rest: bool) -> None:
         leg_end = self._leg_start + self._leg.duration
         if not at_rest or t < leg_end:
             self._settled_since = None
             if t > leg_end + self.flight.arrival_timeout:
-                self._finish("the start was not reached in time", arrived=False)
+                self._give_up(t, position, "the start was not reached in time")
             return
         self._settled_since = t if self._settled_since is None else self._settled_since
         if t - self._settled_since < self.flight.settle_time:
@@ -141,11 +144,17 @@ class Itinerary:
         else:
             self.begin(t, self.trajectory)
 
-    def _finish(self, message: str, arrived: bool = True) -> None:
+    def _finish(self, message: str) -> None:
         path = self._leg if self.goal is Goal.APPROACH else self.trajectory
         last = path.sample(np.array([path.duration]))
         self._hold = (last.position[0], float(last.yaw[0]))
-        self._end(arrived, message)
+        self._end(True, message)
+
+    def _give_up(self, t: float, position: np.ndarray, message: str) -> None:
+        """Hold where the aircraft is: what was not reached is not chased without anybody's will."""
+        yaw = float(self.reference(np.array([t]))[0, YAW])
+        self._hold = (np.array(position, dtype=float), yaw)
+        self._end(False, message)
 
     def _end(self, arrived: bool, message: str) -> None:
         self.goal, self.outcome = Goal.HOLD, Outcome(arrived, message)

@@ -241,4 +241,4 @@ def answer(mode: Mode, i: ModeInputs, p: ModeParameters) -> Tuple[bool, str]:
         granted = mode in (Mode.TAKING_OFF, *STREAMING)
         return granted, "landing" if granted else f"not in flight: {mode.name.lower()}"
     granted = mode in (*AUTOMATIC, Mode.READY, Mode.FAULT)
-    return granted, "authority is given back" if granted else f"nothing held: {mode.name.lower()}"
+    return granted, "giving authority back" if granted else f"nothing held: {mode.name.lower()}"

@@ -111,7 +111,8 @@ class Nmpc:
             return []
         times = self.stage_times(t)
         margin = self.parameters.vehicle.radius + self.parameters.avoidance.safety_distance
-        margin += self.parameters.avoidance.inflation
+        if self.parameters.avoidance.term == "potential":
+            margin += self.parameters.avoidance.inflation  # it acts only inside its reach
         ranked = []
         for obstacle in obstacles:
             centres = np.array([obstacle.position_at(s) for s in times])

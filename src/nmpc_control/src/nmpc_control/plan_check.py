@@ -2,7 +2,7 @@
 """Independent check of a plan before it is flown: the solver's own word for it is not enough."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Optional, Sequence, Tuple
 
@@ -10,13 +10,28 @@ import numpy as np
 
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.prediction import predict, step
-from nmpc_control.state import ATTITUDE, NU, NX, PITCH, POSITION, ROLL, VELOCITY, Obstacle, Plan
+from nmpc_control.rotations import wrap_angle
+from nmpc_control.state import (
+    ATTITUDE,
+    NU,
+    NX,
+    PITCH,
+    POSITION,
+    ROLL,
+    VELOCITY,
+    YAW,
+    YAW_RATE,
+    Obstacle,
+    Plan,
+)
 
 SPACING = 0.05  # [m] of the points between two stages at which clearance is looked at
 MAX_POINTS = 40  # [1] between two stages
 PLAUSIBLE = 1e6  # [any unit] a plan with greater numbers counts as infinite
 MAX_HORIZON = 1000  # [1] stages; a longer plan is a broken one
-MAX_DELAY = 1.0  # [s] a longer dead time is a broken one
+MAX_DT = 0.5  # [s] a longer stage is a broken one
+SAME_DELAY = 1e-6  # [s] by which the plan's dead time may differ from the guard's own
+MAX_YAW_RATE_JUMP = 1.0  # [rad/s] between plan and aircraft
 
 
 def _positive() -> float:
@@ -56,6 +71,7 @@ class Finding(Enum):
     JUMP = "jump"
     COLLISION = "collision"
     CLEARANCE = "clearance"
+    ENVELOPE = "envelope"
 
 
 @dataclass(frozen=True)
@@ -65,6 +81,7 @@ class Verdict:
     finding: Finding
     sentence: str
     clearance: float = math.inf  # [m] hull to the nearest surface over the rest of the plan
+    flown: Optional[Plan] = None  # the plan with the states to which its inputs take this aircraft
 
     @property
     def ok(self) -> bool:
@@ -95,14 +112,45 @@ def check_plan(
         obstacles: as known now.
         params: tolerances.
     """
-    return (
-        _check_form(plan)
+    refusal = (
+        _check_form(plan, vehicle)
         or _check_age(plan, t, params)
         or _check_bounds(plan, limits, params)
         or _check_dynamics(plan, vehicle, params)
         or _check_jump(plan, t, state, inputs, vehicle, params)
-        or check_clearance(plan, t, vehicle, obstacles, params)
     )
+    if refusal:
+        return refusal
+    flown = as_flown(plan, t, state, inputs, vehicle)
+    refusal = _check_envelope(flown, t, state, limits, params)
+    return refusal or replace(check_clearance(flown, t, vehicle, obstacles, params), flown=flown)
+
+
+def as_flown(
+    plan: Plan,
+    t: float,
+    state: np.ndarray,
+    inputs: Sequence[Tuple[float, Sequence[float]]],
+    vehicle: Vehicle,
+) -> Plan:
+    """Return the plan with the states to which its inputs take the aircraft from where it is.
+
+    A plan that is consistent in itself may begin beside the aircraft; what counts is where its
+    inputs lead.
+    """
+    states = plan.states.copy()
+    first = max(0, math.ceil((t - plan.t - plan.delay) / plan.dt))
+    if first > plan.horizon:
+        return plan
+    sent = [(plan.t + k * plan.dt, u) for k, u in enumerate(plan.inputs[: first + 1])]
+    history = [*inputs, *((max(when, t), u) for when, u in sent)]
+    begin = plan.t + plan.delay + first * plan.dt
+    x = predict(state, t, begin, history, vehicle)
+    states[first] = x
+    for k in range(first, plan.horizon):
+        x = step(x, plan.inputs[k], plan.dt, vehicle)
+        states[k + 1] = x
+    return replace(plan, states=states)
 
 
 def check_flown(
@@ -166,7 +214,30 @@ def _clearance_along(
     return times, obstacle.distance(points, times[:, None]) - radius
 
 
-def _check_form(plan: Plan) -> Optional[Verdict]:
+def _check_envelope(
+    plan: Plan, t: float, state: np.ndarray, limits: Limits, params: PlanCheckParameters
+) -> Optional[Verdict]:
+    """Return a refusal where fence, ground or speed are exceeded, and more than they are now."""
+    stages = plan.t + plan.delay + plan.dt * np.arange(len(plan.states))
+    ahead = plan.states[(stages >= t) & (stages <= t + params.clearance_horizon)]
+    if not len(ahead):
+        return None
+
+    def outside(x: np.ndarray) -> np.ndarray:
+        p = x[..., POSITION]
+        return np.maximum(limits.fence_min - p, p - limits.fence_max).max(axis=-1)
+
+    worst, now = float(outside(ahead).max()), max(0.0, float(outside(state)))
+    if worst > now + params.growth_tolerance:
+        return Verdict(Finding.ENVELOPE, f"the plan leaves the fence by {worst:.2f} m")
+    fastest = float(np.linalg.norm(ahead[:, VELOCITY], axis=1).max())
+    speed = max(limits.speed, float(np.linalg.norm(state[VELOCITY])))
+    if fastest > speed + params.velocity_residual:
+        return Verdict(Finding.ENVELOPE, f"the plan reaches {fastest:.1f} m/s")
+    return None
+
+
+def _check_form(plan: Plan, vehicle: Vehicle) -> Optional[Verdict]:
     if not plan.found:
         return Verdict(Finding.NOT_FOUND, f"the solver found no plan: {plan.status}")
     states, inputs = np.shape(plan.states), np.shape(plan.inputs)
@@ -179,7 +250,7 @@ def _check_form(plan: Plan) -> Optional[Verdict]:
         return Verdict(Finding.NOT_FINITE, "the plan contains numbers that are not finite")
     if not all(map(math.isfinite, scalars)):
         return Verdict(Finding.NOT_FINITE, f"the plan's times {scalars} are not finite")
-    if plan.dt <= 0.0 or not 0.0 <= plan.delay <= MAX_DELAY:
+    if not 0.0 < plan.dt <= MAX_DT or abs(plan.delay - vehicle.delay) > SAME_DELAY:
         return Verdict(Finding.SHAPE, f"the plan has step {plan.dt:g} s, delay {plan.delay:g} s")
     return None
 
@@ -234,6 +305,8 @@ def _check_jump(
         ("m away", np.linalg.norm(jump[POSITION]), params.position_jump, "from the aircraft"),
         ("m/s off", np.linalg.norm(jump[VELOCITY]), params.velocity_jump, "its velocity"),
         ("rad off", np.abs(jump[[ROLL, PITCH]]).max(), params.attitude_jump, "its attitude"),
+        ("rad off", abs(wrap_angle(jump[YAW])), params.attitude_jump, "its heading"),
+        ("rad/s off", abs(jump[YAW_RATE]), MAX_YAW_RATE_JUMP, "its yaw rate"),
     ):
         if not size <= tolerance:
             return Verdict(Finding.JUMP, f"the plan begins {size:.2f} {name} {unit}")

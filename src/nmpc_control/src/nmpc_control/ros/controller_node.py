@@ -30,25 +30,21 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import PointStamped, PoseStamped, QuaternionStamped, Vector3Stamped
 from sensor_msgs.msg import Imu
-from std_msgs.msg import Empty
+from std_msgs.msg import Empty, Header
 
 from nmpc_control.controller import Controller
-from nmpc_control.errors import NmpcError
+from nmpc_control.errors import ConfigError, NmpcError
 from nmpc_control.params import Parameters, load_parameters, load_weights
 from nmpc_control.ros.conversions import MessageError, obstacles_from_msg
 from nmpc_control.ros.publishers import Publishers
 from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
 from nmpc_control.rotations import rpy_from_quaternion
 from nmpc_control.scenario import Scenario, load_scenario
-from nmpc_control.state import POSITION, YAW, Goal, Obstacle
+from nmpc_control.state import POSITION, YAW, Goal, Obstacle, hover_input
 from nmpc_msgs.msg import ControllerStatus, ObstacleArray
 
-_ENGAGED = (
-    ControllerStatus.MODE_FLYING,
-    ControllerStatus.MODE_HOVERING,
-    ControllerStatus.MODE_BRAKING,
-)
-_FARTHEST_GOAL = 1000.0  # [m] from the origin; a pose beyond it is a mistake
+_ENGAGED = (ControllerStatus.MODE_FLYING, ControllerStatus.MODE_HOVERING)
+_HOVER = tuple(hover_input())
 
 
 class ControllerNode:
@@ -63,6 +59,7 @@ class ControllerNode:
         self._offered = load_scenario(offered) if offered else None
         self._inputs: Deque[Tuple[float, Tuple[float, ...]]] = deque(maxlen=200)
         self._requests: "queue.Queue[Callable[[float], None]]" = queue.Queue(maxsize=20)
+        self._known: Dict[str, Obstacle] = {}  # of scenarios: a new goal does not remove them
         self._heard: Dict[str, Obstacle] = {}
         self._new_obstacles: Optional[Sequence[Obstacle]] = None
         self.publishers = Publishers(self.frame_id, rospy.get_param("~base_frame", "base_link"))
@@ -97,10 +94,17 @@ class ControllerNode:
                 rate.sleep()
             except rospy.ROSTimeMovedBackwardsException:
                 rospy.logwarn("the clock jumped backwards")
-                self.controller = Controller(self.parameters)
                 last = None
+                self._start_anew()
             except rospy.ROSInterruptException:
                 break
+
+    def _start_anew(self) -> None:
+        """Forget everything that carries a time, as after a jump of the clock."""
+        self.controller = Controller(self.parameters)
+        self._inputs.clear()
+        self._join_obstacles()
+        self.action.finish(rospy.Time.now().to_sec(), False, "the clock jumped backwards")
 
     def _tick(self, now: rospy.Time, misses: int) -> None:
         t = now.to_sec()
@@ -129,14 +133,18 @@ class ControllerNode:
         goal = self.action.accept()
         if goal is None:
             return
+        if self.action.cancelled:
+            self._hold(t, "the goal was cancelled")
+            return
         try:
             scenario = scenario_of(goal, self._offered)
+            self._require_inside_fence(scenario.trajectory.sample(_along(scenario)).position)
         except NmpcError as error:
-            self.action.finish(t, False, str(error))
+            self._hold(t, str(error))  # accepting it has ended the goal before
             return
         estimate = self.controller.estimator.estimate(t)
         if estimate is None or not self.controller.engaged:
-            self.action.finish(t, False, "automatic flight is off: call `start` first")
+            self._hold(t, "automatic flight is off: call `start` first")
             return
         self._use(scenario)
         x = estimate.vector
@@ -150,6 +158,7 @@ class ControllerNode:
 
     def _show(self, scenario: Scenario) -> None:
         self.scenario = scenario
+        self._known.update({obstacle.id: obstacle for obstacle in scenario.obstacles})
         self._join_obstacles()
         self.publishers.trajectory(scenario, None)
         self.publishers.room(scenario.room)
@@ -172,16 +181,29 @@ class ControllerNode:
             rospy.logwarn(
                 f"command/pose refused: frame {pose.header.frame_id!r}, expected {self.frame_id!r}"
             )
-        elif not np.all(np.isfinite(target)) or np.linalg.norm(target) > _FARTHEST_GOAL:
-            rospy.logwarn("command/pose refused: position is not finite or too far away")
+        elif not self._is_inside_fence(target[None]):
+            rospy.logwarn("command/pose refused: the position is not finite or outside the fence")
         elif estimate is None or not self.controller.engaged:
             rospy.logwarn("command/pose refused: automatic flight is off, call `start` first")
         else:
             x = estimate.vector
             given = abs(q.x**2 + q.y**2 + q.z**2 + q.w**2 - 1.0) < 0.05
             yaw = rpy_from_quaternion((q.x, q.y, q.z, q.w))[2] if given else float(x[YAW])
+            if self.controller.itinerary.is_going_to(target):
+                return  # sent again: starting anew each time would never arrive
             self.action.finish(t, False, "replaced by command/pose")
             self.controller.itinerary.go_to(t, x[POSITION], x[YAW], target, yaw)
+
+    def _is_inside_fence(self, points: np.ndarray) -> bool:
+        limits = self.parameters.limits
+        return bool(np.all((points >= limits.fence_min) & (points <= limits.fence_max)))
+
+    def _require_inside_fence(self, points: np.ndarray) -> None:
+        if not self._is_inside_fence(points):
+            limits = self.parameters.limits
+            raise NmpcError(
+                f"the reference leaves the fence from {limits.fence_min} to {limits.fence_max} m"
+            )
 
     def _request(self, action: Callable[[float], None]) -> None:
         try:
@@ -190,11 +212,7 @@ class ControllerNode:
             rospy.logwarn_throttle(1.0, "more requests than can be served: one dropped")
 
     def _join_obstacles(self) -> None:
-        joined = {
-            obstacle.id: obstacle for obstacle in (self.scenario.obstacles if self.scenario else ())
-        }
-        joined.update(self._heard)
-        self.controller.obstacles = tuple(joined.values())
+        self.controller.obstacles = tuple({**self._known, **self._heard}.values())
         self.publishers.obstacles(self.controller.obstacles)
 
     def _subscribe(self) -> None:
@@ -203,27 +221,26 @@ class ControllerNode:
 
         def on_attitude(m: QuaternionStamped) -> None:
             q = m.quaternion
-            self.controller.estimator.add_attitude(m.header.stamp.to_sec(), (q.x, q.y, q.z, q.w))
+            self.controller.estimator.add_attitude(_time(m.header), (q.x, q.y, q.z, q.w))
 
         def on_imu(m: Imu) -> None:
             w = m.angular_velocity
-            self.controller.estimator.add_imu(m.header.stamp.to_sec(), (w.x, w.y, w.z))
+            self.controller.estimator.add_imu(_time(m.header), (w.x, w.y, w.z))
 
         def on_velocity(m: Vector3Stamped) -> None:
-            self.controller.estimator.add_velocity(
-                m.header.stamp.to_sec(), (m.vector.x, m.vector.y, m.vector.z)
-            )
+            v = m.vector
+            self.controller.estimator.add_velocity(_time(m.header), (v.x, v.y, v.z))
 
         def on_position(m: PointStamped) -> None:
-            self.controller.estimator.add_position(
-                m.header.stamp.to_sec(), (m.point.x, m.point.y, m.point.z)
-            )
+            p = m.point
+            self.controller.estimator.add_position(_time(m.header), (p.x, p.y, p.z))
 
         def on_status(m: ControllerStatus) -> None:
             self.controller.engaged = m.mode in _ENGAGED
-            if m.setpoint_sent:
-                u = (m.applied.thrust, m.applied.roll, m.applied.pitch, m.applied.yaw_rate)
-                self._inputs.append((m.header.stamp.to_sec(), u))
+            u = (m.applied.thrust, m.applied.roll, m.applied.pitch, m.applied.yaw_rate)
+            # what DJI or the pilot does is not known; level hover is the nearest that is
+            known = m.setpoint_sent and np.all(np.isfinite(u))
+            self._inputs.append((m.header.stamp.to_sec(), u if known else _HOVER))
 
         def on_obstacles(m: ObstacleArray) -> None:
             try:
@@ -247,16 +264,29 @@ class ControllerNode:
 
 def load_node_parameters() -> Parameters:
     """Return the parameters that the private ROS parameters select; raises ConfigError."""
-    parameters = load_parameters(
-        rospy.get_param("~vehicle", "dji_hil"), rospy.get_param("~weights", "") or "outdoor"
+    vehicle = rospy.get_param("~vehicle", "")
+    if not vehicle:
+        raise ConfigError("parameter", "~vehicle", vehicle, "the name of a file in config/vehicles")
+    parameters = load_parameters(vehicle, rospy.get_param("~weights", "") or "outdoor")
+    backend = rospy.get_param("~backend", parameters.solver.backend)
+    if backend not in ("compiled", "ipopt"):
+        raise ConfigError("parameter", "~backend", backend, "compiled or ipopt")
+    avoidance = bool(rospy.get_param("~avoidance", parameters.avoidance.enabled))
+    return replace(
+        parameters,
+        solver=replace(parameters.solver, backend=backend),
+        avoidance=replace(parameters.avoidance, enabled=avoidance),
     )
-    solver = replace(
-        parameters.solver, backend=rospy.get_param("~backend", parameters.solver.backend)
-    )
-    avoidance = replace(
-        parameters.avoidance, enabled=rospy.get_param("~avoidance", parameters.avoidance.enabled)
-    )
-    return replace(parameters, solver=solver, avoidance=avoidance)
+
+
+def _time(header: Header) -> float:
+    """Return the message's time [s]; one from the future counts as now."""
+    return min(header.stamp.to_sec(), rospy.Time.now().to_sec())
+
+
+def _along(scenario: Scenario) -> np.ndarray:
+    """Return times [s] that cover a scenario's trajectory."""
+    return np.linspace(0.0, scenario.trajectory.duration, 500)
 
 
 def main() -> None:

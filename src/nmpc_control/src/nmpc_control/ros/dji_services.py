@@ -46,6 +46,9 @@ class DjiServices:
         self._on_failure = on_failure
         self._orders: "queue.Queue[Tuple[int, Sequence[Action]]]" = queue.Queue()
         self._newest = 0
+        self.may_hold_authority = (
+            False  # asked for, and not given back with an acknowledgement since
+        )
         self._changed = threading.Event()
         threading.Thread(target=self._work, name="dji_services", daemon=True).start()
 
@@ -54,6 +57,8 @@ class DjiServices:
         calls = [action for action in actions if action in _CALLS]
         if not calls:
             return
+        if Action.OBTAIN_AUTHORITY in calls:
+            self.may_hold_authority = True
         if calls != [Action.SET_REFERENCE]:
             self._newest += 1
             self._changed.set()
@@ -63,7 +68,9 @@ class DjiServices:
         """Give authority back in this thread, ahead of everything that waits."""
         self._newest += 1
         self._changed.set()
-        return _call(Action.RELEASE_AUTHORITY)
+        succeeded, sentence = _call(Action.RELEASE_AUTHORITY)
+        self.may_hold_authority = not succeeded
+        return succeeded, sentence
 
     def _work(self) -> None:
         while not rospy.is_shutdown():
@@ -79,6 +86,8 @@ class DjiServices:
             self._changed.clear()
             succeeded, sentence = _call(action)
             rospy.loginfo(sentence)
+            if succeeded and action is Action.RELEASE_AUTHORITY:
+                self.may_hold_authority = False
             if number != self._newest:
                 return False
             if succeeded:

@@ -73,7 +73,8 @@ class GuardListener:
     def report_failure(self, sentence: str) -> None:
         """Tell the next tick how a service call failed."""
         rospy.logwarn(sentence)
-        self._inbox.failure = sentence
+        with self._lock:
+            self._inbox.failure = sentence
 
     def start_anew(self) -> None:
         """Forget what was received before the clock jumped; authority and obstacles stay."""

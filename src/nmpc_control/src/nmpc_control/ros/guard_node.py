@@ -26,11 +26,11 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import Empty, Header
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
-from nmpc_control.errors import NmpcError
+from nmpc_control.errors import ConfigError, NmpcError
 from nmpc_control.guard import Guard
 from nmpc_control.guard_data import Action, GuardOutput
 from nmpc_control.guard_params import load_guard_parameters
-from nmpc_control.mode_inputs import Request
+from nmpc_control.mode_inputs import ModeInputs, Request
 from nmpc_control.params import load_parameters
 from nmpc_control.ros.dji_services import DjiServices
 from nmpc_control.ros.guard_listener import GuardListener
@@ -38,6 +38,8 @@ from nmpc_control.ros.guard_reports import GuardReports
 
 OVERSLEPT = 0.06  # [s] of wall time between two ticks: this process was not running
 CATCH_UP = 0.01  # [s] of wall time that callbacks then get
+CLOCK_STEP = 0.1  # [s] by which the clock may step back without being a jump
+HEAR_AGAIN = 0.1  # [s] of wall time for telemetry after a jump
 ANSWER_TIMEOUT = 2.0  # [s] wall time in which a tick must answer a service call
 NICENESS = -10  # ahead of solver, recorder and desktop, where the system allows it
 
@@ -60,6 +62,7 @@ class GuardNode:
         self._questions: "queue.Queue[_Question]" = queue.Queue(maxsize=10)
         self._is_leaving = False
         self._t = 0.0
+        self._telemetry = ModeInputs()  # of the last tick
         self._setpoint = rospy.Publisher(
             "dji_sdk/flight_control_setpoint_generic", Joy, queue_size=1, tcp_nodelay=True
         )
@@ -77,8 +80,9 @@ class GuardNode:
         while not (rospy.is_shutdown() or self._is_leaving):
             try:
                 self._tick(rospy.Time.now())
-            except Exception:  # noqa: BLE001 (the stream must not end with one bad message)
+            except Exception as error:  # noqa: BLE001 (the stream must not end with one bad message)
                 rospy.logerr_throttle(1.0, f"tick failed: {traceback.format_exc(limit=-3)}")
+                self._give_way(error)
             try:
                 rate.sleep()
             except rospy.ROSTimeMovedBackwardsException:
@@ -91,13 +95,27 @@ class GuardNode:
                 )  # what came meanwhile waits in the sockets: hear it, then judge
             ticked = time.monotonic()
 
+    def _give_way(self, error: Exception) -> None:
+        """Brake or release after a tick that failed outside the guard itself."""
+        try:
+            output = self.guard.give_way(self._t, self._telemetry, error)
+            if output.axes is not None and not self._is_leaving:
+                self._setpoint.publish(Joy(axes=output.axes))
+            self._act(output)
+        except Exception:  # noqa: BLE001 (there is nothing left to fall back to but the next tick)
+            rospy.logerr_throttle(1.0, f"giving way failed: {traceback.format_exc(limit=-3)}")
+
     def _tick(self, now: rospy.Time) -> None:
-        t = now.to_sec()
-        if t < self._t:
+        if now.to_sec() < self._t - CLOCK_STEP:
+            self._t = now.to_sec()
             self._listener.start_anew()
+            time.sleep(HEAR_AGAIN)  # or all that was heard before the jump would count as missing
+            return
+        t = max(now.to_sec(), self._t)  # a small step back: time stands still until it is caught up
         self._t = t
         question = self._next_question()
         inputs = self._listener.take(t, question.request if question else None)
+        self._telemetry = inputs.telemetry
         try:
             output = self.guard.tick(inputs)
         except Exception as error:  # noqa: BLE001 (whatever it is, the aircraft is in the air)
@@ -123,7 +141,7 @@ class GuardNode:
     def _leave(self) -> None:
         """Give authority back while ROS still lives: silence alone is not relied upon."""
         self._is_leaving = True
-        if self._listener.authority:
+        if self._dji.may_hold_authority:
             _, sentence = self._dji.release_now()
             rospy.logwarn(f"shutting down: {sentence}")
 
@@ -165,7 +183,7 @@ def main() -> None:
 
 def _guard() -> Guard:
     params = load_guard_parameters()
-    parameters = load_parameters(rospy.get_param("~vehicle", "dji_hil"))
+    parameters = load_parameters(_vehicle_name())
     vehicle = parameters.vehicle
     if params.vertical_command == "thrust" and not vehicle.thrust_map.measured_on:
         where = f"vehicles/{vehicle.name}.yaml: thrust_map.measured_on is empty"
@@ -178,6 +196,13 @@ def _ask_for_priority() -> None:
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
     except PermissionError:
         rospy.loginfo("no right to a higher priority: give it by limits.conf, nice")
+
+
+def _vehicle_name() -> str:
+    name = rospy.get_param("~vehicle", "")
+    if not name:
+        raise ConfigError("parameter", "~vehicle", name, "the name of a file in config/vehicles")
+    return name
 
 
 def _refuse(sentence: str, status: int) -> int:

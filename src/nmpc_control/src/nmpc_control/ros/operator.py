@@ -26,11 +26,7 @@ _PHASES = {
     Plan.GOAL_APPROACH: "approach",
     Plan.GOAL_TRAJECTORY: "trajectory",
 }
-_ON_GROUND = (
-    ControllerStatus.MODE_READY,
-    ControllerStatus.MODE_RELEASED,
-    ControllerStatus.MODE_WAITING,
-)
+_ON_GROUND = (ControllerStatus.MODE_READY, ControllerStatus.MODE_WAITING)
 
 
 class FlightError(Exception):

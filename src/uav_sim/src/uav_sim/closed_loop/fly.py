@@ -112,12 +112,14 @@ def _fly(options: argparse.Namespace, scenario: Scenario, bag: Path) -> int:
         nodes = subprocess.Popen(
             launch, stdout=output, stderr=output, env=environment, start_new_session=True
         )
-        operator = subprocess.Popen(
-            ["rosrun", "nmpc_control", "fly_scenario", scenario.name],
-            env=environment,
-            start_new_session=True,
-        )
+        operator = None
         try:
+            _wait_for_simulated_time(nodes, master)
+            operator = subprocess.Popen(
+                ["rosrun", "nmpc_control", "fly_scenario", scenario.name],
+                env=environment,
+                start_new_session=True,
+            )
             while operator.poll() is None:
                 if nodes.poll() is not None:
                     _say(f"the nodes ended unexpectedly, see {log}")

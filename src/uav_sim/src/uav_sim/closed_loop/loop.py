@@ -11,9 +11,10 @@ from nmpc_control.guard import Guard
 from nmpc_control.guard_data import Action, GuardOutput
 from nmpc_control.guard_inbox import GuardInbox
 from nmpc_control.guard_params import GuardParameters
-from nmpc_control.mode_inputs import STREAMING, Request
+from nmpc_control.mode_inputs import PLANNED, STREAMING, Request
 from nmpc_control.params import Parameters
 from nmpc_control.scenario import Scenario
+from nmpc_control.state import hover_input
 from uav_sim.m100 import SimulatedM100, Truth
 from uav_sim.preset import PlantPreset
 from uav_sim.world import World
@@ -105,9 +106,9 @@ class ClosedLoop:
             self._act(action)
         if output.axes is not None:
             self.aircraft.setpoint(_GENERIC, output.axes)
-        if output.applied is not None:
-            self.controller.record_input(self.t, np.array(output.applied))
-        self.controller.engaged = output.mode in STREAMING
+        known = output.axes is not None and output.applied is not None
+        self.controller.record_input(self.t, np.array(output.applied) if known else hover_input())
+        self.controller.engaged = output.mode in PLANNED
         self.log.outputs.append((self.t, output))
 
     def _act(self, action: Action) -> None:
