@@ -17,7 +17,7 @@ def flight(ros):
     ros.launch("uav_sim", "simulator.launch")
     ros.wait_for_node("/uav_sim")
     for name in ("flight_guard", "nmpc_controller"):
-        ros.start("rosrun", "nmpc_control", name)
+        ros.start("rosrun", "nmpc_control", name, "_vehicle:=dji_hil")
         ros.wait_for_node(f"/{name}")
     return ros
 
@@ -76,7 +76,7 @@ def test_thrust_is_not_commanded_through_an_unmeasured_map(monkeypatch):
     vehicle = dataclasses.replace(parameters.vehicle, thrust_map=thrust_map)
     unmeasured = dataclasses.replace(parameters, vehicle=vehicle)
     monkeypatch.setattr(guard_node, "load_parameters", lambda name: unmeasured)
-    monkeypatch.setattr(guard_node.rospy, "get_param", lambda name, default: default)
+    monkeypatch.setattr(guard_node.rospy, "get_param", lambda name, default: "eth")
     said = []
     monkeypatch.setattr(guard_node.rospy, "logfatal", said.append)
     with pytest.raises(SystemExit) as end:
@@ -96,3 +96,10 @@ def test_an_unknown_vehicle_ends_in_one_line(ros):
     log = ros.output()
     assert "m600.yaml: file: got 'No such file or directory', expected a readable file" in log
     assert "Traceback" not in log
+
+
+@pytest.mark.parametrize("node", ["flight_guard", "nmpc_controller"])
+def test_no_vehicle_is_assumed(ros, node):
+    process = ros.start("rosrun", "nmpc_control", node)
+    assert process.wait(60) == 2
+    assert "parameter: ~vehicle: got ''" in ros.output()

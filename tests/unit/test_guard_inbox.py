@@ -53,3 +53,13 @@ def test_plan_request_and_failure_reach_one_tick_only(inbox):
     assert (first.telemetry.request, first.telemetry.failure) == (Request.START, "refused")
     assert (second.plan, second.plan_error) == (None, "")
     assert (second.telemetry.request, second.telemetry.failure) == (None, "")
+
+
+def test_a_switch_that_leaves_f_between_two_ticks_is_not_missed(inbox):
+    f, p = (0, 0, 0, 0, 8000.0, -10000.0), (0, 0, 0, 0, -8000.0, -10000.0)
+    inbox.add_rc(1.00, f)
+    assert inbox.inputs(1.00).telemetry.rc is RcMode.F
+    inbox.add_rc(1.005, p)
+    inbox.add_rc(1.015, f)
+    assert inbox.inputs(1.02).telemetry.rc is RcMode.P
+    assert inbox.inputs(1.04).telemetry.rc is RcMode.F

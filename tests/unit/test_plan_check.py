@@ -286,3 +286,58 @@ def test_a_verified_plan_is_looked_at_again():
     assert check_flown(plan, t=10.3, obstacles=popped_up, **again).finding is Finding.COLLISION
     passed = [sphere([0.0, 2.0, 3.0], radius=0.45)]  # behind: the past is not looked at
     assert check_flown(plan, t=10.3, obstacles=passed, **again).ok
+
+
+def test_a_plan_is_judged_by_where_its_inputs_lead_this_aircraft():
+    """A plan consistent in itself, 0.9 m beside the aircraft, clears a sphere that is hit."""
+    state, _ = flying_east(speed=2.0)
+    beside = state.copy()
+    beside[1] += 0.9
+    _, plan = flying_east(speed=2.0)
+    plan = dataclasses.replace(plan, states=plan.states + (beside - state))
+    ball = sphere(state[:3] + [4.0, -0.3, 0.0], radius=0.4)
+    assert ball.distance(plan.states[:, :3]).min() - VEHICLE.radius > CHECK.minimum_clearance
+    assert check(plan, state=state, obstacles=[ball]).finding is Finding.COLLISION
+    assert check(plan, state=beside, obstacles=[ball]).ok
+
+
+def test_another_heading_or_yaw_rate_is_a_jump(hover):
+    for i, off in ((5, math.pi), (5, 0.5), (9, 8.0)):
+        state = START.copy()
+        state[i] += off
+        assert check(hover, state=state).finding is Finding.JUMP
+
+
+def test_the_dead_time_is_the_guards_own(hover):
+    plan = dataclasses.replace(hover, delay=hover.delay + 0.05)
+    assert check(plan, params=EVERYTHING).finding is Finding.SHAPE
+    assert check(dataclasses.replace(hover, dt=2.0), params=EVERYTHING).finding is Finding.SHAPE
+
+
+def test_ground_fence_and_speed_are_kept():
+    low = START.copy()
+    low[2] = LIMITS.fence_min[2] + 0.5
+    sinking = make_plan(low, 10.0, [GRAVITY - 1.0, 0.0, 0.0, 0.0])
+    assert check(sinking, state=low).finding is Finding.ENVELOPE
+    level = make_plan(low, 10.0)
+    assert check(level, state=low).ok
+    state, _ = flying_east(speed=LIMITS.speed + 1.0)
+    ahead = state.copy()
+    ahead[0] += VEHICLE.delay * state[6]
+    plan = make_plan(ahead, 10.0, [GRAVITY, 0.0, state[4], 0.0])
+    assert check(plan, state=state).ok, "pushed by a gust: slowing down must be open"
+    state, _ = flying_east(speed=LIMITS.speed - 1.0)
+    ahead = state.copy()
+    ahead[0] += VEHICLE.delay * state[6]
+    faster = make_plan(ahead, 10.0, [GRAVITY, 0.0, 0.3, 0.0])
+    assert check(faster, state=state).finding is Finding.ENVELOPE
+
+
+def test_outside_the_fence_only_a_plan_that_does_not_go_farther_is_flown():
+    outside = START.copy()
+    outside[2] = LIMITS.fence_min[2] - 0.3
+    assert check(make_plan(outside, 10.0), state=outside).ok
+    rising = make_plan(outside, 10.0, [GRAVITY + 0.5, 0.0, 0.0, 0.0])
+    assert check(rising, state=outside).ok
+    sinking = make_plan(outside, 10.0, [GRAVITY - 0.5, 0.0, 0.0, 0.0])
+    assert check(sinking, state=outside).finding is Finding.ENVELOPE
