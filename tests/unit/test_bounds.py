@@ -122,3 +122,18 @@ def test_bounds_that_cannot_be_meant_are_refused(nmpc, limits):
     with pytest.raises(ProblemError):
         nmpc.use(dataclasses.replace(base, limits=dataclasses.replace(base.limits, **limits)))
     assert nmpc.parameters is base
+
+
+@pytest.mark.parametrize("soft_weight", [1000.0, 50.0, 5.0])
+def test_where_a_bound_cannot_hold_both_solve_the_same_l1_problem(soft_weight):
+    """The weight of the penalty means what it says, also far outside the fence."""
+    x0 = hover_state(np.array([0.0, 3.0, 5.0]))
+    solutions = []
+    for backend in ("compiled", "ipopt"):
+        optimiser = tight(backend)
+        optimiser.solver.tolerance = 1e-5
+        limits = {"fence_max": np.array([1000.0, 0.5, 1000.0]), "soft_weight": soft_weight}
+        solutions.append(solve(optimiser, x0, **limits)[1])
+    ours, theirs = solutions
+    assert ours.cost == pytest.approx(theirs.cost, rel=2e-3)
+    assert ours.states[20, 1] == pytest.approx(theirs.states[20, 1], abs=0.05)

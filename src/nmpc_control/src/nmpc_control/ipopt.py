@@ -21,6 +21,7 @@ from nmpc_control.ocp import (
 from nmpc_control.solution import Guess, Solution, cold_guess, worst_violation
 from nmpc_control.state import NU, NX
 
+_FEASIBLE = 1e-3  # [state or input unit] violation of hard constraints that can be flown
 _SHOWN = 2e-3  # [m], [m/s] by which a softened bound must be exceeded to be reported
 
 
@@ -84,10 +85,11 @@ class IpoptSolver:
         g = np.asarray(result["g"]).ravel()
         defect = float(np.max(np.abs(g[: N * NX])))
         excess = z[slacks:].reshape(N + 1, self.structure.inequalities)
+        too_fast = float(np.max(g[N * NX + count :]))
         violation, softened = worst_violation(excess, self._kinds, _SHOWN)
         status = str(stats["return_status"])
         return Solution(
-            found=bool(np.all(np.isfinite(z)) and defect < 1e-3),
+            found=bool(np.all(np.isfinite(z)) and max(defect, too_fast) < _FEASIBLE),
             status="converged" if stats["success"] else status,
             states=z[:free_states].reshape(N + 1, NX),
             inputs=np.clip(inputs, instance.input_min, instance.input_max),

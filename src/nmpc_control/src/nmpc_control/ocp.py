@@ -237,12 +237,22 @@ def inequalities(structure: Structure, s: Symbols) -> ca.SX:
     return constraints.inequalities(s.x[:3], s.x[6:9], s.bounds, distances)
 
 
-def augmented_residuals(structure: Structure, s: Symbols, terminal: bool) -> Tuple[ca.SX, ca.SX]:
-    """Return residuals and weights of a stage with its augmented Lagrangian."""
+def augmented_residuals(
+    structure: Structure, s: Symbols, terminal: bool
+) -> Tuple[ca.SX, ca.SX, ca.SX]:
+    """Return residuals r, weights w and the cost of a stage with its augmented Lagrangian.
+
+    Where the force of a softened bound would pass the weight rho of the L1 penalty, the cost goes on
+    linearly; there w is what makes 2 w r the gradient all the same.
+    """
     r, w = residuals(structure, s, terminal)
-    mu = ca.DM(constraints.curvature(structure.obstacle_slots))
+    mu, rho = ca.DM(constraints.curvature(structure.obstacle_slots)), s.bounds["soft_weight"]
     excess = ca.fmax(0, inequalities(structure, s) + s.multipliers / mu)
-    return ca.vertcat(r, excess), ca.vertcat(w, mu / 2)
+    force = mu * excess
+    part = ca.fmin(1, rho / ca.fmax(force, 1e-9))
+    penalty = ca.if_else(force <= rho, mu / 2 * excess**2, rho * excess - rho**2 / (2 * mu))
+    cost = ca.dot(w, r * r) + ca.sum1(penalty)
+    return ca.vertcat(r, excess), ca.vertcat(w, mu / 2 * part), cost
 
 
 def stage_cost(structure: Structure, s: Symbols, terminal: bool) -> ca.SX:

@@ -93,11 +93,11 @@ def _backward(structure: Structure, exact: bool) -> ca.Function:
 
 def _terminal_model(structure: Structure, exact: bool) -> ca.Function:
     s = Symbols(structure)
-    r, w = augmented_residuals(structure, s, terminal=True)
+    r, w, cost = augmented_residuals(structure, s, terminal=True)
     J = ca.jacobian(r, s.x)
     gradient = 2 * J.T @ (w * r)
     P = ca.SX(NZ, NZ)
-    P[:NX, :NX] = ca.hessian(ca.dot(w, r * r), s.x)[0] if exact else 2 * J.T @ (ca.diag(w) @ J)
+    P[:NX, :NX] = ca.hessian(cost, s.x)[0] if exact else 2 * J.T @ (ca.diag(w) @ J)
     adjoint = ca.vertcat(gradient, ca.SX.zeros(NU))
     return ca.Function(
         "terminal_model",
@@ -117,11 +117,12 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
 
     x_next = next_state(structure, s)
     A, B = ca.jacobian(x_next, s.x), ca.jacobian(x_next, s.u)
-    r, w = augmented_residuals(structure, s, terminal=False)
+    r, w, cost = augmented_residuals(structure, s, terminal=False)
     z = ca.vertcat(s.x, s.u_before)
     Jz, Ju = ca.jacobian(r, z), ca.jacobian(r, s.u)
     cost_z, cost_u = 2 * Jz.T @ (w * r), 2 * Ju.T @ (w * r)
-    Hzz, Huz, Huu = _hessian(r, w, ca.dot(adjoint[:NX], x_next) if exact else None, z, s.u)
+    lagrangian = cost + ca.dot(adjoint[:NX], x_next) if exact else None
+    Hzz, Huz, Huu = _hessian(r, w, lagrangian, z, s.u)
 
     # exact gradient of the cost along the dynamics, and the bounds that hold an input
     gradient = cost_u + B.T @ adjoint[:NX] + adjoint[NX:]
@@ -197,7 +198,7 @@ def _forward(structure: Structure) -> ca.Function:
     u = ca.fmin(ca.fmax(law, low), high)
     outputs = [
         next_state(structure, s),
-        _augmented_cost(structure, s, False),
+        augmented_residuals(structure, s, False)[2],
         inequalities(structure, s),
     ]
     x_next, cost, g = ca.substitute(outputs, [s.u], [u])
@@ -222,7 +223,7 @@ def _forward(structure: Structure) -> ca.Function:
     last = ca.Function(
         "terminal_cost",
         [s.x, s.stage, s.theta, s.multipliers],
-        [_augmented_cost(structure, s, True), ca.densify(g)],
+        [augmented_residuals(structure, s, True)[2], ca.densify(g)],
     )
 
     x0, u_before, length = ca.MX.sym("x0", NX), ca.MX.sym("u_before", NU), ca.MX.sym("alpha")
@@ -269,21 +270,16 @@ def _forward(structure: Structure) -> ca.Function:
     )
 
 
-def _augmented_cost(structure: Structure, s: Symbols, terminal: bool) -> ca.SX:
-    r, w = augmented_residuals(structure, s, terminal)
-    return ca.dot(w, r * r)
-
-
 def _hessian(
-    r: ca.SX, w: ca.SX, dynamics: Optional[ca.SX], z: ca.SX, u: ca.SX
+    r: ca.SX, w: ca.SX, lagrangian: Optional[ca.SX], z: ca.SX, u: ca.SX
 ) -> Tuple[ca.SX, ca.SX, ca.SX]:
     """Return the blocks zz, uz, uu of the Hessian of w'r^2 (+ adjoint' F).
 
     Exact, or Gauss-Newton without F.
     """
-    if dynamics is not None:
+    if lagrangian is not None:
         both = ca.vertcat(z, u)
-        H = ca.hessian(ca.dot(w, r * r) + dynamics, both)[0]
+        H = ca.hessian(lagrangian, both)[0]
         return H[:NZ, :NZ], H[NZ:, :NZ], H[NZ:, NZ:]
     Jz, Ju, W = ca.jacobian(r, z), ca.jacobian(r, u), ca.diag(w)
     return 2 * Jz.T @ (W @ Jz), 2 * Ju.T @ (W @ Jz), 2 * Ju.T @ (W @ Ju)

@@ -156,7 +156,9 @@ class SqpSolver:
         """
         g, mu = self._inequalities, self._curvature
         excess = np.maximum(0.0, g + self._arrays["multipliers"] / mu)
-        return float(augmented - np.sum(mu / 2 * excess**2) + weight * np.sum(np.maximum(0.0, g)))
+        linear = weight * excess - weight**2 / (2 * mu)
+        penalty = np.where(mu * excess <= weight, mu / 2 * excess**2, linear)
+        return float(augmented - np.sum(penalty) + weight * np.sum(np.maximum(0.0, g)))
 
     def _update_multipliers(self, weight: float) -> float:
         """Move the multipliers by the inequalities at the iterate.
