@@ -9,10 +9,11 @@ RVIZ ?=
 in_workspace := . devel/setup.bash &&
 single_thread := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help build fly test lint clean
+.PHONY: help build fly bench test lint clean
 
 help:
 	@echo "make fly [SCENARIO=multi_obstacle] [PLANT=dji_hil] [SPEED=1.0] [RVIZ=1]   fly in the simulator, record, report"
+	@echo "make bench [BENCH_ARGS=...]   performance tables, build/bench.json, figures; ten minutes (--quick: one)"
 	@echo "make test [PYTEST_ARGS=...]   everything that continuous integration runs"
 	@echo "make build   system packages, Python packages and the workspace, as far as they are missing"
 	@echo "make lint    ruff and catkin_lint"
@@ -25,6 +26,9 @@ build:
 
 fly: build
 	@$(in_workspace) rosrun uav_sim fly "$$SCENARIO" --plant "$$PLANT" --speed "$$SPEED" $(if $(filter-out 0,$(RVIZ)),--rviz)
+
+bench: build
+	@$(in_workspace) $(single_thread) .venv/bin/python3 -m uav_sim.closed_loop.bench $(BENCH_ARGS)
 
 test: lint
 	@$(single_thread) .setup/python38.sh

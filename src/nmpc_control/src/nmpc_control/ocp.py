@@ -242,8 +242,8 @@ def augmented_residuals(
 ) -> Tuple[ca.SX, ca.SX, ca.SX]:
     """Return residuals r, weights w and the cost of a stage with its augmented Lagrangian.
 
-    Where the force of a softened bound would pass the weight rho of the L1 penalty, the cost goes on
-    linearly; there w is what makes 2 w r the gradient all the same.
+    Where the force of a softened bound would pass the weight rho of the L1 penalty, the cost goes
+    on linearly; there w is what makes 2 w r the gradient all the same.
     """
     r, w = residuals(structure, s, terminal)
     mu, rho = ca.DM(constraints.curvature(structure.obstacle_slots)), s.bounds["soft_weight"]
