@@ -30,4 +30,7 @@ rm -f build/.built
 echo "$place" >build/.place
 step catkin "building the workspace" "the build failed: see the lines above" \
   catkin_make --no-color -DPYTHON_EXECUTABLE="$PWD/.venv/bin/python3"
+step solver "compiling the solver" "the solver does not compile: see the lines above" \
+  env PYTHONPATH=src/nmpc_control/src .venv/bin/python3 -c \
+  "from nmpc_control.nmpc import Nmpc; from nmpc_control.params import load_parameters; Nmpc(load_parameters())"
 echo "$place $sources" >build/.built

@@ -37,6 +37,7 @@ from nmpc_control.errors import ConfigError, NmpcError
 from nmpc_control.params import Parameters, load_parameters, load_weights
 from nmpc_control.ros.conversions import MessageError, obstacles_from_msg
 from nmpc_control.ros.publishers import Publishers
+from nmpc_control.ros.subscriptions import Subscriptions
 from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
 from nmpc_control.rotations import rpy_from_quaternion
 from nmpc_control.scenario import Scenario, load_scenario
@@ -216,8 +217,7 @@ class ControllerNode:
         self.publishers.obstacles(self.controller.obstacles)
 
     def _subscribe(self) -> None:
-        def listen(topic: str, kind: type, callback: Callable, queue_size: int = 1) -> None:
-            rospy.Subscriber(topic, kind, callback, queue_size=queue_size, tcp_nodelay=True)
+        listen = Subscriptions().add
 
         def on_attitude(m: QuaternionStamped) -> None:
             q = m.quaternion

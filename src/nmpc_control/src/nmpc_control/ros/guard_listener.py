@@ -21,6 +21,7 @@ from nmpc_control.guard_inbox import GuardInbox
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.mode_inputs import Request
 from nmpc_control.ros.conversions import MessageError, obstacles_from_msg, plan_from_msg
+from nmpc_control.ros.subscriptions import Subscriptions
 from nmpc_msgs.msg import ObstacleArray, Plan
 
 _POSITION_TOPICS = {"gps": "dji_sdk/local_position", "external": "world_position"}
@@ -36,6 +37,7 @@ class GuardListener:
         self._inbox = GuardInbox(params)
         self._lock = threading.Lock()
         self._obstacles_heard = -math.inf  # [s]
+        subscriptions = Subscriptions()
         for topic, kind, callback in (
             ("dji_sdk/attitude", QuaternionStamped, self._on_attitude),
             ("dji_sdk/imu", Imu, self._on_imu),
@@ -49,7 +51,7 @@ class GuardListener:
             ("nmpc/plan", Plan, self._on_plan),
             ("nmpc/obstacles", ObstacleArray, self._on_obstacles),
         ):
-            rospy.Subscriber(topic, kind, self._locked(callback), queue_size=1, tcp_nodelay=True)
+            subscriptions.add(topic, kind, self._locked(callback))
 
     def take(self, t: float, request: Optional[Request]) -> GuardInputs:
         """Return what a tick at ``t`` [s] sees, with the operator's request."""

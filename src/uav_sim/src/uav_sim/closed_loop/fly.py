@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Fly one scenario in the simulator through ROS, record it, and say how it went.
 
-Starts a ROS master of its own (or none of yours: the port is free), simulator, controller, guard,
-markers and
-recorder; an operator then starts, flies and lands. Leaves ``<scenario>_<time>.bag`` with ``.json``,
-figures and report.
+Starts a ROS master of its own, simulator, controller, guard, markers and recorder; an operator
+then starts, flies and lands. Leaves <scenario>_<time>.bag with .json, figures and report.
 """
 
 import argparse
@@ -46,7 +44,12 @@ def main(argv: Optional[List[str]] = None) -> None:
     except OSError as error:
         _fail(f"--bags: {options.bags}: {error.strerror}")
     bag = options.bags / f"{scenario.name}_{time.strftime('%Y%m%d-%H%M%S')}.bag"
+    for closing in (signal.SIGTERM, signal.SIGHUP):  # as Ctrl-C: end everything that was started
+        signal.signal(closing, signal.default_int_handler)
     status = _fly(options, scenario, bag)
+    if status is None:
+        _say(f"interrupted; what was recorded is in {bag}")
+        sys.exit(1)
     sys.exit(_judge(bag, status))
 
 
@@ -86,8 +89,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _fly(options: argparse.Namespace, scenario: Scenario, bag: Path) -> int:
-    """Run the flight; returns the operator's exit status."""
+def _fly(options: argparse.Namespace, scenario: Scenario, bag: Path) -> Optional[int]:
+    """Run the flight; returns the operator's exit status, None if it was interrupted."""
     environment = _environment(options.port or _free_port())
     path = scenario_path(options.scenario).resolve()
     launch = [
@@ -128,8 +131,7 @@ def _fly(options: argparse.Namespace, scenario: Scenario, bag: Path) -> int:
                 time.sleep(0.2)
             return operator.returncode if operator.returncode is not None else 1
         except KeyboardInterrupt:
-            _say("interrupted")
-            return 1
+            return None
         finally:
             if operator is not None:
                 _end(operator, signal.SIGINT)

@@ -3,9 +3,8 @@
 
 Controller, guard and simulated aircraft in one process.
 
-With ``--plant paper`` a scenario that has a variant ``paper`` is flown as in the paper's table of
-simulations (geometry,
-duration, start at rest, the paper's meaning of distance: from the aircraft's centre, no hull).
+With --plant paper a scenario that has a variant "paper" is flown as in the paper's table of
+simulations: its geometry, duration, start at rest, and distances from the aircraft's centre.
 """
 
 import argparse
