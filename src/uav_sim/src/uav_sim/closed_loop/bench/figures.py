@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""The bench's figures as PNG files."""
+
+from pathlib import Path
+from typing import Any, Callable, Dict, List
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402 - the backend must be chosen before
+import numpy as np  # noqa: E402
+
+_COLOURS = {
+    "budgeted": "tab:green",
+    "converged": "tab:olive",
+    "ipopt": "tab:blue",
+    "paper": "tab:red",
+}
+
+
+def draw(results: Dict[str, Any], folder: Path) -> List[Path]:
+    """Write a figure for every section that was measured; return the files."""
+    makers: Dict[str, Callable[[Any], plt.Figure]] = {
+        "samples_ms": _backends,
+        "scaling_n": lambda _: _scaling(results),
+        "horizon": _horizon,
+        "presets": _presets,
+    }
+    names = {"samples_ms": "backends", "scaling_n": "scaling"}
+    files = []
+    for key, maker in makers.items():
+        if key in results:
+            figure = maker(results[key])
+            files.append(folder / f"bench_{names.get(key, key)}.png")
+            figure.savefig(files[-1], dpi=120)
+            plt.close(figure)
+    return files
+
+
+def _backends(samples: Dict[str, Dict[str, List[float]]]) -> plt.Figure:
+    """Time of a solve, every problem a point, by kind of problem and backend."""
+    kinds = [kind for kind in samples if kind != "all"]
+    figure, axes = plt.subplots(figsize=(9, 4.5), layout="constrained")
+    width = 0.8 / len(samples["all"])
+    for i, kind in enumerate(kinds):
+        for j, (name, times) in enumerate(samples[kind].items()):
+            x = i - 0.4 + width * (j + 0.5)
+            spread = x + 0.6 * width * (np.linspace(0.0, 1.0, len(times)) - 0.5)
+            label = name if i == 0 else None
+            axes.plot(spread, times, ".", color=_COLOURS[name], markersize=4, label=label)
+            axes.plot([x - width / 2.5, x + width / 2.5], 2 * [np.median(times)], "k", lw=1.5)
+    axes.set_xticks(range(len(kinds)), [kind.replace("_", "\n", 1) for kind in kinds])
+    axes.set(yscale="log", ylabel="one call from Python [ms]", title="The same problems, one run")
+    axes.grid(axis="y", alpha=0.3)
+    axes.legend(loc="upper left", ncols=4)
+    return figure
+
+
+def _scaling(results: Dict[str, Any]) -> plt.Figure:
+    figure, panels = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    for axes, key, label in zip(
+        panels,
+        ("scaling_n", "scaling_obstacles"),
+        ("stages N", "obstacles, each in a slot of its own"),
+    ):
+        data = results[key]
+        axes.plot(data["size"], data["p50_ms"], "o-", color=_COLOURS["budgeted"])
+        axes.set(xlabel=label, ylabel="median solve [ms]", ylim=(0, None))
+        axes.set_title(f"growth with the power {data['exponent']:.2f}")
+        axes.grid(alpha=0.3)
+    return figure
+
+
+def _horizon(rows: List[Dict[str, Any]]) -> plt.Figure:
+    figure, panels = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    seconds = [row["seconds"] for row in rows]
+    for key, label in (("deviation_mean", "mean deviation"), ("clearance", "least clearance")):
+        panels[0].plot(seconds, [row[key] for row in rows], "o-", label=label)
+    panels[0].set(ylabel="[m]")
+    panels[0].legend()
+    panels[1].plot(seconds, [row["cost"] for row in rows], "o-", color="tab:purple")
+    panels[1].set(ylabel="closed-loop cost [1/s]")
+    for axes in panels:
+        axes.set(xlabel="horizon [s]", ylim=(0, None))
+        axes.grid(alpha=0.3)
+    figure.suptitle("multi_obstacle at 2.35 m/s: what a longer look ahead is worth")
+    return figure
+
+
+def _presets(laps: List[Dict[str, Any]]) -> plt.Figure:
+    figure, axes = plt.subplots(figsize=(5, 5), layout="constrained")
+    corners = np.array(laps[0]["corners"])
+    closed = np.vstack([corners, corners[:1]])
+    axes.plot(closed[:, 0], closed[:, 1], "k--", lw=1, label="reference")
+    for lap in laps:
+        path = np.array(lap["path"])
+        label = f"{lap['preset']}, {lap['speed']:g} m/s"
+        axes.plot(path[:, 0], path[:, 1], label=label)
+    axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    axes.grid(alpha=0.3)
+    axes.legend(loc="center")
+    return figure

@@ -1,0 +1,107 @@
+"""The bench as a program: what it writes, what it refuses."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from uav_sim.closed_loop.bench import cli
+from uav_sim.closed_loop.bench.agreement import Comparison, summary
+from uav_sim.closed_loop.bench.comparison import relative_gap
+from uav_sim.closed_loop.bench.effort import QUICK
+from uav_sim.closed_loop.bench.laps import PRESETS, lap
+from uav_sim.closed_loop.bench.native import native_time, traced_calls
+from uav_sim.closed_loop.bench.random_problems import random_problems
+from uav_sim.closed_loop.bench.recording import exact_solver
+
+ROW = {
+    *("problem", "backend", "p50_ms", "p95_ms", "p99_ms", "max_ms"),
+    *("iterations_mean", "cost_gap", "residual"),
+}
+
+
+@pytest.fixture
+def tiny(monkeypatch):
+    effort = replace(QUICK, problems=1, repeats=1, until=0.1, horizons=(10, 20), slots=(0, 1, 2))
+    monkeypatch.setattr(cli, "QUICK", effort)
+
+
+def test_json_has_the_keys_that_others_read(tiny, tmp_path, capsys):
+    cli.main(["--quick", "--quiet", "--out", str(tmp_path), "--only", "backends", "scaling"])
+    data = json.loads((tmp_path / "bench.json").read_text())
+    assert {"machine", "versions", "rows", "python_share"} <= set(data)
+    assert {row["backend"] for row in data["rows"]} == {"budgeted", "converged", "ipopt", "paper"}
+    assert all(set(row) == ROW for row in data["rows"])
+    assert data["rows"][-1]["problem"] == "all"
+    for key, sizes in (("scaling_n", [10, 20]), ("scaling_obstacles", [0, 1, 2])):
+        assert data[key]["size"] == sizes
+        assert len(data[key]["p50_ms"]) == len(sizes)
+        assert np.isfinite(data[key]["exponent"])
+    assert 0.0 < data["python_share"] < 1.0
+    assert (tmp_path / "bench_backends.png").stat().st_size > 1000
+    assert "budgeted" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [(["--only", "nothing"], "--only"), (["--seed", "-1"], "--seed"), (["--seed", "x"], "--seed")],
+)
+def test_bad_input_ends_with_status_two(arguments, named, capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(arguments)
+    assert end.value.code == 2
+    assert named in capsys.readouterr().err
+
+
+def test_folder_that_is_a_file_is_named(tmp_path, capsys):
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(SystemExit) as end:
+        cli.main(["--out", str(file), "--only", "paper"])
+    assert end.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_calls_of_compiled_functions_are_traced_and_released():
+    problem = random_problems(seed=0, count=1)[0]
+    solver = exact_solver(problem.structure)
+    with traced_calls() as calls:
+        iterations = solver.solve(problem.instance, problem.guess).iterations
+    assert len(calls) >= 2 * iterations, "at least one sweep each way for every iteration"
+    traced = len(calls)
+    solver.solve(problem.instance, problem.guess)
+    assert len(calls) == traced
+    assert native_time(solver, problem) > 0.0
+
+
+def test_gap_is_relative_to_the_best_cost():
+    assert relative_gap(110.0, 100.0) == pytest.approx(0.1)
+    assert relative_gap(2e-6, 1e-6) == pytest.approx(1e-3), "costs near zero are rounding"
+
+
+def comparison(gap, input_gap, reached):
+    return Comparison("k", 0, 1.0, gap, input_gap, reached, 1, "converged", 3, 0.0, "converged", 9)
+
+
+def test_summary_counts_worse_ones_and_other_inputs():
+    figures = summary(
+        [
+            comparison(0.0, 0.0, reached=False),
+            comparison(2e-4, 0.5, reached=True),
+            comparison(-1e-3, 0.5, reached=True),
+            comparison(5e-5, 2e-3, reached=False),
+        ]
+    )
+    assert figures["not_worse_percent"] == 75.0
+    assert figures["better_percent"] == 25.0
+    assert figures["same_input_percent"] == 50.0, "only those without an obstacle in reach count"
+    assert figures["without_obstacle"] == 2
+
+
+def test_position_priority_keeps_the_corners_and_velocity_priority_rounds_them():
+    keeping, rounding = (lap(*preset) for preset in PRESETS)
+    assert keeping.corner_distance < 0.2
+    assert keeping.roundness < 0.90  # a hexagon has 0.87
+    assert rounding.corner_distance > 0.6
+    assert rounding.roundness > 0.93  # a circle has 1
