@@ -8,10 +8,10 @@ import pytest
 
 from uav_sim.closed_loop.bench import cli
 from uav_sim.closed_loop.bench.agreement import Comparison, summary
-from uav_sim.closed_loop.bench.comparison import relative_gap
 from uav_sim.closed_loop.bench.effort import QUICK
 from uav_sim.closed_loop.bench.laps import PRESETS, lap
 from uav_sim.closed_loop.bench.native import native_time, traced_calls
+from uav_sim.closed_loop.bench.objective import relative_gap
 from uav_sim.closed_loop.bench.random_problems import random_problems
 from uav_sim.closed_loop.bench.recording import exact_solver
 

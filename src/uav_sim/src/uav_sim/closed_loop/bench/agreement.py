@@ -21,14 +21,13 @@ from nmpc_control.ocp import Structure
 from nmpc_control.solution import Guess, Solution
 from nmpc_control.state import POSITION
 from uav_sim.closed_loop.bench.backends import converged, tight_ipopt
-from uav_sim.closed_loop.bench.objective import Objective
+from uav_sim.closed_loop.bench.objective import Objective, relative_gap
 from uav_sim.closed_loop.bench.problem import Problem
 from uav_sim.closed_loop.bench.problems import KINDS, in_reach, recorded_problems
 from uav_sim.closed_loop.bench.random_problems import random_problems
 
 COST_LIMIT = 1e-4  # [1] relative: more is worse
 INPUT_LIMIT = 1e-3  # [1] of the input's range: less is the same
-_FLOOR = 1e-3  # least cost that a gap is relative to: near the reference, costs are rounding
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class Judge:
         a, b = self.ours.solve(instance, problem.guess), self.theirs.solve(instance, problem.guess)
         cost_a, states_a = self._objective(instance, a.inputs)
         cost_b, states_b = self._objective(instance, b.inputs)
-        gap = _gap(cost_a, cost_b)
+        gap = relative_gap(cost_a, cost_b)
         span = instance.input_max - instance.input_min
         return Comparison(
             kind=problem.kind,
@@ -85,12 +84,11 @@ class Judge:
 
     def _verdict(self, problem: Problem, solution: Solution, cost: float) -> str:
         again = self._polisher.solve(problem.instance, Guess(solution.states, solution.inputs))
-        better = _gap(cost, self._objective(problem.instance, again.inputs)[0]) > 0.1 * COST_LIMIT
+        better = (
+            relative_gap(cost, self._objective(problem.instance, again.inputs)[0])
+            > 0.1 * COST_LIMIT
+        )
         return "not converged" if better else "local minimum"
-
-
-def _gap(cost: float, best: float) -> float:
-    return (cost - best) / max(best, _FLOOR)
 
 
 def summary(comparisons: List[Comparison]) -> Dict[str, float]:

@@ -10,13 +10,12 @@ import numpy as np
 from nmpc_control.params import Parameters
 from uav_sim.closed_loop.bench.backends import all_backends, tight_ipopt
 from uav_sim.closed_loop.bench.native import native_time
-from uav_sim.closed_loop.bench.objective import Objective
+from uav_sim.closed_loop.bench.objective import Objective, relative_gap
 from uav_sim.closed_loop.bench.paper_backend import PaperBackend
 from uav_sim.closed_loop.bench.problem import Problem
 from uav_sim.closed_loop.bench.recording import structure_of
 
 ALL = "all"
-COST_FLOOR = 1e-3  # least cost that a gap is relative to: near the reference, costs are rounding
 
 
 @dataclass(frozen=True)
@@ -29,13 +28,8 @@ class Sample:
     residual: float  # largest violation of dynamics or bounds
 
 
-def relative_gap(cost: float, best: float) -> float:
-    """Return the relative excess of a cost over the best known."""
-    return (cost - best) / max(best, COST_FLOOR)
-
-
 class Comparison:
-    """Runs the backends problem by problem, interleaved, so that all see the same load."""
+    """Runs the backends in turn on one problem after the other, so that all see the same load."""
 
     def __init__(self, parameters: Parameters, repeats: int = 5) -> None:
         structure = structure_of(parameters)
@@ -46,16 +40,17 @@ class Comparison:
         self._oracle, self._objective = tight_ipopt(structure), Objective(structure)
 
     def run(self, problem: Problem) -> None:
-        """Solve one problem with every backend, some times in turn; keep the fastest."""
+        """Solve one problem some times with every backend; keep the fastest."""
         for backend in self.backends.values():
             backend.prepare(problem)
-        best = dict.fromkeys(self.backends, float("inf"))
-        solutions = {}
-        for _ in range(self._repeats):
-            for name, backend in self.backends.items():
+        best, solutions = {}, {}
+        for name, backend in self.backends.items():
+            times = []
+            for _ in range(self._repeats):
                 start = time.perf_counter()
                 solutions[name] = backend.solve(problem)
-                best[name] = min(best[name], time.perf_counter() - start)
+                times.append(time.perf_counter() - start)
+            best[name] = min(times)
         self.native.append(native_time(self.backends["budgeted"].solver, problem))
         instance = problem.instance
         reference = self._oracle.solve(instance, problem.guess)

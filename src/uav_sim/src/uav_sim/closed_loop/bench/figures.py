@@ -52,7 +52,7 @@ def _backends(samples: Dict[str, Dict[str, List[float]]]) -> plt.Figure:
     axes.set_xticks(range(len(kinds)), [kind.replace("_", "\n", 1) for kind in kinds])
     axes.set(yscale="log", ylabel="one call from Python [ms]", title="The same problems, one run")
     axes.grid(axis="y", alpha=0.3)
-    axes.legend(loc="upper left", ncols=4)
+    axes.legend(loc="upper left", ncol=4)
     return figure
 
 

@@ -17,6 +17,13 @@ from nmpc_control.ocp import (
 )
 from nmpc_control.state import NU, NX
 
+COST_FLOOR = 1e-3  # least cost that a gap is relative to: near the reference, costs are rounding
+
+
+def relative_gap(cost: float, best: float) -> float:
+    """Return the relative excess of a cost over the best known."""
+    return (cost - best) / max(best, COST_FLOOR)
+
 
 class Objective:
     """Total cost of a problem, with the L1 penalty on its softened bounds, as a function of inputs.
