@@ -7,8 +7,6 @@ Scalar last (x, y, z, w), body FLU to world ENU, roll-pitch-yaw about x, y, z.
 import math
 from typing import Sequence, Tuple
 
-import numpy as np
-
 
 def wrap_angle(angle: float) -> float:
     """Return the angle [rad] in (-pi, pi]."""
@@ -40,10 +38,3 @@ def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Tuple[float, f
         cr * cp * sy - sr * sp * cy,
         cr * cp * cy + sr * sp * sy,
     )
-
-
-def thrust_direction(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Return the body z axis (3,) in the world frame for roll, pitch, yaw [rad]."""
-    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    cy, sy = math.cos(yaw), math.sin(yaw)
-    return np.array([cr * sp * cy + sr * sy, cr * sp * sy - sr * cy, cr * cp])

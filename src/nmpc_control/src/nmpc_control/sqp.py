@@ -127,10 +127,11 @@ class SqpSolver:
 
         Fall back to hover when that is not finite. Returns the cost.
         """
-        for candidate in (guess, cold_guess(instance.x0, self.structure.horizon)):
+        a = self._arrays
+        for warm in (True, False):
+            candidate = guess if warm else cold_guess(instance.x0, self.structure.horizon)
             if candidate is None or not np.all(np.isfinite(candidate.inputs)):
                 continue
-            a = self._arrays
             a["X"][:], a["U"][:] = candidate.states.T, candidate.inputs.T
             if candidate.gains is None:
                 a["gains"][:] = 0.0

@@ -17,8 +17,6 @@ import numpy as np
 
 NX = 10
 NU = 4
-STATE_NAMES = ("x", "y", "z", "roll", "pitch", "yaw", "vx", "vy", "vz", "yaw_rate")
-INPUT_NAMES = ("thrust", "roll", "pitch", "yaw_rate")
 
 POSITION = slice(0, 3)
 ATTITUDE = slice(3, 6)
