@@ -101,7 +101,7 @@ def test_both_backends_fly_the_same_way():
     for backend in ("compiled", "ipopt"):
         parameters = load_parameters("dji_hil", scenario.weights)
         solver = dataclasses.replace(parameters.solver, backend=backend)
-        solver = solver.with_budget(tolerance=1e-6, time_budget=1.0, rate=10.0)
+        solver = solver.with_budget(tolerance=1e-9, time_budget=1.0, rate=10.0)
         figures[backend] = simulate(
             scenario, dataclasses.replace(parameters, solver=solver), "dji_hil"
         )

@@ -24,8 +24,7 @@ def parameters(backend: str, **solver: object) -> Parameters:
 
 def tight(backend: str) -> Nmpc:
     """Return an optimiser that iterates until it is exact."""
-    tolerance = {"compiled": 1e-6, "ipopt": 1e-9}[backend]
-    return Nmpc(parameters(backend, tolerance=tolerance, max_iterations=500, time_budget=30.0))
+    return Nmpc(parameters(backend, tolerance=1e-9, max_iterations=500, time_budget=30.0))
 
 
 def straight_reference(nmpc: Nmpc, speed: float = 1.5) -> np.ndarray:

@@ -31,7 +31,7 @@ def drawn():
 
 @pytest.fixture(scope="module")
 def solver(recorded):
-    return exact_solver(recorded["hexagon"][0].structure, tolerance=1e-6)
+    return exact_solver(recorded["hexagon"][0].structure, tolerance=1e-9)
 
 
 def test_every_kind_is_recorded(recorded):

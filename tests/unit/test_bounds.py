@@ -18,7 +18,7 @@ START = hover_state(np.array([0.0, 0.0, 5.0]))
 def nmpc(request) -> Nmpc:
     optimiser = tight(request.param)
     if request.param == "compiled":
-        optimiser.solver.tolerance = 1e-4
+        optimiser.solver.tolerance = 1e-7
     return optimiser
 
 
@@ -131,7 +131,7 @@ def test_where_a_bound_cannot_hold_both_solve_the_same_l1_problem(soft_weight):
     solutions = []
     for backend in ("compiled", "ipopt"):
         optimiser = tight(backend)
-        optimiser.solver.tolerance = 1e-5
+        optimiser.solver.tolerance = 1e-8
         limits = {"fence_max": np.array([1000.0, 0.5, 1000.0]), "soft_weight": soft_weight}
         solutions.append(solve(optimiser, x0, **limits)[1])
     ours, theirs = solutions

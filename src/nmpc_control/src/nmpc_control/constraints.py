@@ -8,7 +8,7 @@ gust). The compiled solver reaches it by
 an augmented Lagrangian with multipliers bounded by rho; IPOPT by slack variables.
 """
 
-from typing import Dict, List, Tuple
+from typing import Dict, List
 
 import casadi as ca
 import numpy as np
@@ -16,6 +16,9 @@ import numpy as np
 SPEED, FENCE, OBSTACLE = "speed", "fence", "obstacle"
 # curvature of the augmented Lagrangian per row: about a hundred times that of the tracking cost
 _CURVATURE = {SPEED: 500.0, FENCE: 2000.0, OBSTACLE: 2000.0}
+
+
+PILOT_BOUNDS = 7  # rows of speed and fence, before those of the obstacles
 
 
 def rows(obstacle_slots: int) -> List[str]:
@@ -28,20 +31,19 @@ def curvature(obstacle_slots: int) -> np.ndarray:
     return np.array([_CURVATURE[kind] for kind in rows(obstacle_slots)])
 
 
-def inequalities(
-    position: ca.SX, velocity: ca.SX, bounds: Dict[str, ca.SX], distances: List[Tuple[ca.SX, ca.SX]]
-) -> ca.SX:
-    """Return g of speed [m/s], fence (6) [m] and Eq. 7 (one per slot) [m].
+def pilot_bounds(position: ca.SX, velocity: ca.SX, bounds: Dict[str, ca.SX]) -> ca.SX:
+    """Return g (7,) of speed [m/s] and fence [m].
 
     Args:
         position: (3,) [m].
         velocity: (3,) [m/s].
-        bounds: ``speed``, ``fence_min`` (3,), ``fence_max`` (3,), ``hard_obstacles`` (1 or 0).
-        distances: per slot distance to the centre and least allowed distance [m].
+        bounds: ``speed``, ``fence_min`` (3,), ``fence_max`` (3,).
     """
     # of second order in the excess, but smooth at rest, unlike the norm
     speed = (ca.dot(velocity, velocity) - bounds["speed"] ** 2) / (2 * bounds["speed"])
-    obstacles = [bounds["hard_obstacles"] * (least - d) for d, least in distances]
-    return ca.vertcat(
-        speed, position - bounds["fence_max"], bounds["fence_min"] - position, *obstacles
-    )
+    return ca.vertcat(speed, position - bounds["fence_max"], bounds["fence_min"] - position)
+
+
+def obstacle(d: ca.SX, slot: ca.SX, selected: ca.SX) -> ca.SX:
+    """Return g [m] of Eq. 7 at a distance d from a slot's centre; 0 where it is not selected."""
+    return selected * (1 / slot[4] - d)

@@ -205,18 +205,21 @@ def next_state(structure: Structure, s: Symbols) -> ca.SX:
     return discrete(s.x, s.u, s.model, structure.dt, structure.integrator)
 
 
-def residuals(structure: Structure, s: Symbols, terminal: bool) -> Tuple[ca.SX, ca.SX]:
-    """Return residuals r and weights w with stage cost sum w r^2, as Gauss-Newton needs."""
+def tracking_residuals(s: Symbols, terminal: bool) -> Tuple[ca.SX, ca.SX]:
+    """Return residuals r and weights w: w r^2 is the tracking cost of a stage, as in Eq. 5."""
     error = s.x - s.stage[:NX]
     error[YAW] -= 2 * ca.pi * ca.floor((error[YAW] + ca.pi) / (2 * ca.pi))
-    potential = [_potential_root(s.x[:3], slot) for slot in _slots(structure, s.stage)]
-    eta = [0.5 * s.eta] * len(potential)
     if terminal:
-        return ca.vertcat(error, *potential), ca.vertcat(s.Q_f, *eta)
+        return error, s.Q_f
     return (
-        ca.vertcat(error, s.u - s.stage[NX : NX + NU], s.u - s.u_before, *potential),
-        ca.vertcat(s.Q, s.R, s.R_delta, *eta),
+        ca.vertcat(error, s.u - s.stage[NX : NX + NU], s.u - s.u_before),
+        ca.vertcat(s.Q, s.R, s.R_delta),
     )
+
+
+def potential(d: ca.SX, slot: ca.SX, eta: ca.SX) -> ca.SX:
+    """Return U_i (Eq. 8) at a distance d [m] from the centre of the obstacle in a slot (5,)."""
+    return eta / 2 * ca.fmax(0, 1 / d - slot[4]) ** 2
 
 
 def input_bounds(structure: Structure, s: Symbols) -> Tuple[ca.SX, ca.SX]:
@@ -232,39 +235,23 @@ def input_bounds(structure: Structure, s: Symbols) -> Tuple[ca.SX, ca.SX]:
 
 
 def inequalities(structure: Structure, s: Symbols) -> ca.SX:
-    """Return g, to be <= 0, of one stage."""
-    distances = [(_distance(s.x[:3], slot), 1 / slot[4]) for slot in _slots(structure, s.stage)]
-    return constraints.inequalities(s.x[:3], s.x[6:9], s.bounds, distances)
-
-
-def augmented_residuals(
-    structure: Structure, s: Symbols, terminal: bool
-) -> Tuple[ca.SX, ca.SX, ca.SX]:
-    """Return residuals r, weights w and the cost of a stage with its augmented Lagrangian.
-
-    Where the force of a softened bound would pass the weight rho of the L1 penalty, the cost goes
-    on linearly; there w is what makes 2 w r the gradient all the same.
-    """
-    r, w = residuals(structure, s, terminal)
-    mu, rho = ca.DM(constraints.curvature(structure.obstacle_slots)), s.bounds["soft_weight"]
-    excess = ca.fmax(0, inequalities(structure, s) + s.multipliers / mu)
-    force = mu * excess
-    part = ca.fmin(1, rho / ca.fmax(force, 1e-9))
-    penalty = ca.if_else(force <= rho, mu / 2 * excess**2, rho * excess - rho**2 / (2 * mu))
-    cost = ca.dot(w, r * r) + ca.sum1(penalty)
-    return ca.vertcat(r, excess), ca.vertcat(w, mu / 2 * part), cost
+    """Return g, to be <= 0, of one stage: speed, fence, Eq. 7 of every slot."""
+    obstacles = [
+        constraints.obstacle(distance(s.x[:3], slot), slot, s.bounds["hard_obstacles"])
+        for slot in split_slots(structure, s.stage)
+    ]
+    return ca.vertcat(constraints.pilot_bounds(s.x[:3], s.x[6:9], s.bounds), *obstacles)
 
 
 def stage_cost(structure: Structure, s: Symbols, terminal: bool) -> ca.SX:
-    """Return the cost of one stage (Eq.
-
-    5 with Eqs. 8, 9), without the penalty on the inequalities.
-    """
-    r, w = residuals(structure, s, terminal)
-    return ca.dot(w, r * r)
+    """Return the cost of one stage (Eqs. 5, 8, 9) without the penalty on the inequalities."""
+    r, w = tracking_residuals(s, terminal)
+    slots = split_slots(structure, s.stage)
+    return ca.dot(w, r * r) + sum(potential(distance(s.x[:3], i), i, s.eta) for i in slots)
 
 
-def _slots(structure: Structure, stage: ca.SX) -> Sequence[ca.SX]:
+def split_slots(structure: Structure, stage: ca.SX) -> Sequence[ca.SX]:
+    """Return the data (5,) of every obstacle slot of a stage."""
     first = NX + NU
     return [
         stage[first + SLOT_SIZE * i : first + SLOT_SIZE * (i + 1)]
@@ -272,11 +259,13 @@ def _slots(structure: Structure, stage: ca.SX) -> Sequence[ca.SX]:
     ]
 
 
-def _distance(position: ca.SX, slot: ca.SX) -> ca.SX:
+def squared_distance(position: ca.SX, slot: ca.SX) -> ca.SX:
+    """Return the squared distance [m^2] from the centre of the obstacle in a slot (5,)."""
     offset = position - slot[:3]
-    # the small constant keeps the derivative finite at the very centre of an obstacle
-    return ca.sqrt(offset[0] ** 2 + offset[1] ** 2 + slot[3] * offset[2] ** 2 + 1e-6)
+    # the small constant keeps the root's derivative finite at the very centre
+    return offset[0] ** 2 + offset[1] ** 2 + slot[3] * offset[2] ** 2 + 1e-6
 
 
-def _potential_root(position: ca.SX, slot: ca.SX) -> ca.SX:
-    return ca.fmax(0, 1 / _distance(position, slot) - slot[4])
+def distance(position: ca.SX, slot: ca.SX) -> ca.SX:
+    """Return the distance [m] from the centre of the obstacle in a slot (5,)."""
+    return ca.sqrt(squared_distance(position, slot))

@@ -136,7 +136,7 @@ class Budget:
     rate: float = _positive()  # [Hz] solves per second
     max_iterations: int = field(metadata={"min": 1, "max": 1000})
     time_budget: float = _positive()  # [s] wall time for one solve
-    tolerance: float = _positive()  # of optimality, and [m], [m/s] of softened bounds
+    tolerance: float = _positive()  # [1] see the solver's
 
 
 @dataclass(frozen=True)

@@ -1,35 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""The two sweeps of the compiled solver as CasADi functions.
+"""The backward sweep of the compiled solver: a Newton step of the whole horizon, stage by stage.
 
-Backward (Newton system), forward (rollout).
-
-Backward, from stage N to 0 (discrete-time Riccati recursion of the Gauss-Newton model, see e.g.
-Frison and
-Jorgensen 2013; here the previous input is part of the state, so that R_delta keeps the stage
-structure):
-the exact adjoint gives the gradient g of the cost with respect to every input; inputs that sit on a
-bound
-with the gradient pushing outward are held (Bertsekas 1982, projected Newton), on a bound of their
-rate they
-follow the input before; the others get the feedback law du = k + K [dx; du_before]. Forward: the
-model is rolled out under that law with step length alpha, inputs
-clipped to their bounds, so every iterate satisfies dynamics and bounds exactly.
+From stage N to 0 (discrete-time Riccati recursion, see e.g. Frison and Jorgensen 2013; here the
+previous input is part of the state, so that R_delta keeps the stage structure). The exact adjoint
+gives the gradient of the cost by every input; an input on a bound with the gradient pushing outward
+is held (Bertsekas 1982, projected Newton), one whose step would cross a bound is sent to the bound
+(Tassa et al. 2014); on a bound of its rate it follows the input before. The others get the feedback
+law du = step + K [dx; du_before].
 """
 
-from typing import List, Optional, Tuple
+from typing import List, Tuple
 
 import casadi as ca
 import numpy as np
 
-from nmpc_control.ocp import (
-    THETA_SIZE,
-    Structure,
-    Symbols,
-    augmented_residuals,
-    inequalities,
-    input_bounds,
-    next_state,
-)
+from nmpc_control import augmented, obstacle_terms
+from nmpc_control.ocp import THETA_SIZE, Structure, Symbols, input_bounds, next_state
 from nmpc_control.small_matrices import (
     cholesky,
     forward_substitution,
@@ -40,47 +26,42 @@ from nmpc_control.small_matrices import (
 from nmpc_control.state import NU, NX
 
 NZ = NX + NU  # state of the recursion: x and the input before
+# rows of a sweep's summary: derivative of the cost along the step with its feedback, by how much
+# the full step lowers the model of the cost, largest projected gradient scaled by the input ranges,
+# inputs on a bound, least pivot of the recursion, inputs that the step takes to a bound or from it
+SUMMARY = ("slope", "promise", "residual", "active", "pivot", "changed")
 _ACTIVE_TOLERANCE = 1e-9  # [input unit] distance at which an input counts as on its bound
 
 
-def sweeps(structure: Structure) -> Tuple[ca.Function, ca.Function, ca.Function]:
-    """Return the functions ``backward``, ``backward_exact`` and ``forward`` over the whole horizon.
+def backward(structure: Structure, exact: bool) -> ca.Function:
+    """Return the function ``backward`` or ``backward_exact``.
 
-    backward(X (10, N+1), U (4, N), u_before (4,), stages, theta, multipliers (nc, N+1), damping) ->
-        gains (4, 14 N), step (4, N), summary (4,): slope of the cost along the step, largest
-        projected
-        gradient (scaled by the input ranges), number of active bounds, least pivot of the recursion
-    backward_exact: the same with the exact Hessian of the Lagrangian, which need not be
-        positive: the least
-        pivot says whether its step may be used
-    forward(x0 (10,), u_before (4,), X, U, gains, step, alpha, stages, theta, multipliers) -> X_new,
-    U_new,
-        cost (of the augmented Lagrangian, up to a constant), inequalities (nc, N+1)
+    (X (10, N+1), U (4, N), u_before (4,), stages, theta, multipliers (nc, N+1), damping) ->
+    gains (4, 14 N), step (4, N), summary (6,). The exact Hessian of the Lagrangian need not be
+    positive: the least pivot says whether its step may be used.
     """
-    return _backward(structure, False), _backward(structure, True), _forward(structure)
-
-
-def _backward(structure: Structure, exact: bool) -> ca.Function:
     N = structure.horizon
     last, inner = _terminal_model(structure, exact), _stage_backward(structure, exact)
     X, U = ca.MX.sym("X", NX, N + 1), ca.MX.sym("U", NU, N)
     u_before, stages = ca.MX.sym("u_before", NU), ca.MX.sym("stages", structure.stage_size, N + 1)
     theta, damping = ca.MX.sym("theta", THETA_SIZE), ca.MX.sym("damping")
     multipliers = ca.MX.sym("multipliers", structure.inequalities, N + 1)
-    xs, us, data, lam = (
-        ca.horzsplit(X),
-        ca.horzsplit(U),
-        ca.horzsplit(stages),
-        ca.horzsplit(multipliers),
-    )
-    P, s, adjoint = last(xs[N], data[N], theta, lam[N])
+    xs, us, data = ca.horzsplit(X), ca.horzsplit(U), ca.horzsplit(stages)
+    forces = ca.horzsplit(multipliers)
+    gradients, hessians = [ca.MX.zeros(3)] * (N + 1), [ca.MX.zeros(6)] * (N + 1)
+    if structure.obstacle_slots:
+        all_stages = obstacle_terms.derivatives(structure, exact).map(N + 1)
+        obstacles = all_stages(X, stages, ca.repmat(theta, 1, N + 1), multipliers)
+        gradients, hessians = (ca.horzsplit(part) for part in obstacles)
+    P, s, adjoint, along = last(xs[N], data[N], theta, forces[N], gradients[N], hessians[N])
     gains: List[ca.MX] = [None] * N
     step: List[ca.MX] = [None] * N
-    summary = ca.MX([0.0, 0.0, 0.0, np.inf])
+    summary = ca.MX([0.0, 0.0, 0.0, 0.0, np.inf, 0.0])
     for k in reversed(range(N)):
         before = us[k - 1] if k else u_before
-        gains[k], step[k], P, s, adjoint, summary = inner(
-            xs[k], us[k], before, data[k], theta, lam[k], damping, P, s, adjoint, summary
+        here = [xs[k], us[k], before, data[k], theta, forces[k], gradients[k], hessians[k]]
+        gains[k], step[k], P, s, adjoint, along, summary = inner(
+            *here, damping, P, s, adjoint, along, summary
         )
     return ca.Function(
         "backward_exact" if exact else "backward",
@@ -93,48 +74,46 @@ def _backward(structure: Structure, exact: bool) -> ca.Function:
 
 def _terminal_model(structure: Structure, exact: bool) -> ca.Function:
     s = Symbols(structure)
-    r, w, cost = augmented_residuals(structure, s, terminal=True)
-    J = ca.jacobian(r, s.x)
-    gradient = 2 * J.T @ (w * r)
+    obstacle_gradient, obstacle_hessian = ca.SX.sym("g", 3), ca.SX.sym("H", 6)
+    gradient, H = augmented.derivatives(s, True, ca.SX(0) if exact else None, s.x)
     P = ca.SX(NZ, NZ)
-    P[:NX, :NX] = ca.hessian(cost, s.x)[0] if exact else 2 * J.T @ (ca.diag(w) @ J)
+    P[:NX, :NX] = H
+    P[:3, :3] += unpack_symmetric(obstacle_hessian, 3)
+    gradient[:3] += obstacle_gradient
     adjoint = ca.vertcat(gradient, ca.SX.zeros(NU))
     return ca.Function(
         "terminal_model",
-        [s.x, s.stage, s.theta, s.multipliers],
-        [pack_symmetric(P), adjoint, adjoint],
+        [s.x, s.stage, s.theta, s.multipliers, obstacle_gradient, obstacle_hessian],
+        [pack_symmetric(P), adjoint, adjoint, adjoint],
     )
 
 
 def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
     s = Symbols(structure)
+    obstacle_gradient, obstacle_hessian = ca.SX.sym("g", 3), ca.SX.sym("H", 6)
     damping = ca.SX.sym("damping")
     P_half = ca.SX.sym("P", NZ * (NZ + 1) // 2)
-    value_gradient, adjoint = ca.SX.sym("s", NZ), ca.SX.sym("adjoint", NZ)
-    summary = ca.SX.sym("summary", 4)
+    # gradients by the next state: of the model's value, of the cost, of the cost under the feedback
+    value_gradient, adjoint, along = (ca.SX.sym(name, NZ) for name in ("s", "adjoint", "along"))
+    summary = ca.SX.sym("summary", len(SUMMARY))
     P = unpack_symmetric(P_half, NZ)
     Pxx, Pxu, Puu = P[:NX, :NX], P[:NX, NX:], P[NX:, NX:]
 
     x_next = next_state(structure, s)
     A, B = ca.jacobian(x_next, s.x), ca.jacobian(x_next, s.u)
-    r, w, cost = augmented_residuals(structure, s, terminal=False)
-    z = ca.vertcat(s.x, s.u_before)
-    Jz, Ju = ca.jacobian(r, z), ca.jacobian(r, s.u)
-    cost_z, cost_u = 2 * Jz.T @ (w * r), 2 * Ju.T @ (w * r)
-    lagrangian = cost + ca.dot(adjoint[:NX], x_next) if exact else None
-    Hzz, Huz, Huu = _hessian(r, w, lagrangian, z, s.u)
+    value = ca.dot(adjoint[:NX], x_next) if exact else None
+    cost, H = augmented.derivatives(s, False, value, ca.vertcat(s.x, s.u_before, s.u))
+    cost_z, cost_u = cost[:NZ], cost[NZ:]
+    Hzz, Huz, Huu = H[:NZ, :NZ], H[NZ:, :NZ], H[NZ:, NZ:]
+    cost_z[:3] += obstacle_gradient
+    Hzz[:3, :3] += unpack_symmetric(obstacle_hessian, 3)
 
     # exact gradient of the cost along the dynamics, and the bounds that hold an input
     gradient = cost_u + B.T @ adjoint[:NX] + adjoint[NX:]
     low, high = input_bounds(structure, s)
-    held_low = ca.logic_and(s.u <= low + _ACTIVE_TOLERANCE, gradient > 0)
-    held_high = ca.logic_and(s.u >= high - _ACTIVE_TOLERANCE, gradient < 0)
-    free = 1 - ca.logic_or(held_low, held_high)
-    # an input held by its rate follows the input before
-    by_rate = ca.logic_or(
-        ca.logic_and(held_low, low > s.u_min), ca.logic_and(held_high, high < s.u_max)
-    )
-    H = ca.horzcat(ca.SX(NU, NX), ca.diag(by_rate))
+    on_low, on_high = s.u <= low + _ACTIVE_TOLERANCE, s.u >= high - _ACTIVE_TOLERANCE
+    held_low, held_high = ca.logic_and(on_low, gradient > 0), ca.logic_and(on_high, gradient < 0)
+    by_rate = _by_rate(held_low, held_high, low, high, s)
     adjoint_before = cost_z + ca.vertcat(A.T @ adjoint[:NX], by_rate * gradient)
 
     # quadratic model of the cost to go in (dz, du)
@@ -145,141 +124,50 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
     qu = cost_u + B.T @ value_gradient[:NX] + value_gradient[NX:]
     qz = cost_z + ca.vertcat(A.T @ value_gradient[:NX], ca.SX.zeros(NU))
 
-    F = ca.diag(free)
-    L, pivots = cholesky(F @ (Quu + damping * ca.SX.eye(NU)) @ F + ca.diag(1 - free))
-    coupling = F @ (Quz + Quu @ H)
-    step = -solve(L, free * qu)
-    gains = H - solve(L, coupling)
+    damped = Quu + damping * ca.SX.eye(NU)
+    tried = _free_step(damped, qu, 1 - ca.logic_or(held_low, held_high), ca.SX.zeros(NU))[0]
+    at_low = ca.logic_or(held_low, tried < low - s.u)
+    at_high = ca.logic_or(held_high, tried > high - s.u)
+    free = 1 - ca.logic_or(at_low, at_high)
+    fixed = ca.if_else(at_low, low - s.u, ca.if_else(at_high, high - s.u, 0))
+    step, L, pivots = _free_step(damped, qu, free, fixed)
+    follow = ca.horzcat(ca.SX(NU, NX), ca.diag(_by_rate(at_low, at_high, low, high, s)))
+    coupling = ca.diag(free) @ (Quz + damped @ follow)
+    gains = follow - solve(L, coupling)
     half = forward_substitution(L, coupling)
-    mixed = H.T @ Quz
-    P_before = Qzz + mixed + mixed.T + H.T @ Quu @ H - half.T @ half
-    s_before = qz + H.T @ qu + coupling.T @ step
+    mixed = follow.T @ Quz
+    P_before = Qzz + mixed + mixed.T + follow.T @ damped @ follow - half.T @ half
+    s_before = qz + follow.T @ (qu + damped @ step) + Quz.T @ step
+
+    along_u = cost_u + B.T @ along[:NX] + along[NX:]
+    along_before = cost_z + ca.vertcat(A.T @ along[:NX], ca.SX.zeros(NU)) + gains.T @ along_u
 
     span = s.u_max - s.u_min
     violation = ca.mmax(ca.fabs(s.u - ca.fmin(ca.fmax(s.u - gradient * span**2, low), high)) / span)
     new_summary = ca.vertcat(
-        summary[0]
-        + ca.dot(free * qu, step),  # qu is the gradient under the feedback of the later stages
-        ca.fmax(summary[1], violation),
-        summary[2] + NU - ca.sum1(free),
-        ca.fmin(summary[3], ca.mmin(ca.vertcat(*pivots))),
+        summary[0] + ca.dot(along_u, step),
+        summary[1] - ca.dot(step, qu + Quu @ step / 2),
+        ca.fmax(summary[2], violation),
+        summary[3] + NU - ca.sum1(free),
+        ca.fmin(summary[4], ca.mmin(ca.vertcat(*pivots))),
+        summary[5] + ca.sum1(ca.fabs(ca.logic_or(on_low, on_high) - (1 - free))),
     )
     return ca.Function(
         "stage_backward",
-        [
-            s.x,
-            s.u,
-            s.u_before,
-            s.stage,
-            s.theta,
-            s.multipliers,
-            damping,
-            P_half,
-            value_gradient,
-            adjoint,
-            summary,
-        ],
-        [ca.densify(gains), step, pack_symmetric(P_before), s_before, adjoint_before, new_summary],
+        [s.x, s.u, s.u_before, s.stage, s.theta, s.multipliers, obstacle_gradient]
+        + [obstacle_hessian, damping, P_half, value_gradient, adjoint, along, summary],
+        [ca.densify(gains), step, pack_symmetric(P_before)]
+        + [s_before, adjoint_before, along_before, new_summary],
     )
 
 
-def _forward(structure: Structure) -> ca.Function:
-    N = structure.horizon
-    s = Symbols(structure)
-    x_bar, u_bar, before_bar = (
-        ca.SX.sym("x_bar", NX),
-        ca.SX.sym("u_bar", NU),
-        ca.SX.sym("b_bar", NU),
-    )
-    K, step, alpha = ca.SX.sym("K", NU, NZ), ca.SX.sym("step", NU), ca.SX.sym("alpha")
-    deviation = ca.vertcat(s.x - x_bar, s.u_before - before_bar)
-    law = u_bar + alpha * step + K @ deviation
-    low, high = input_bounds(structure, s)
-    u = ca.fmin(ca.fmax(law, low), high)
-    outputs = [
-        next_state(structure, s),
-        augmented_residuals(structure, s, False)[2],
-        inequalities(structure, s),
-    ]
-    x_next, cost, g = ca.substitute(outputs, [s.u], [u])
-    inner = ca.Function(
-        "stage_forward",
-        [
-            s.x,
-            s.u_before,
-            x_bar,
-            u_bar,
-            before_bar,
-            K,
-            step,
-            alpha,
-            s.stage,
-            s.theta,
-            s.multipliers,
-        ],
-        [x_next, u, cost, ca.densify(g)],
-    )
-    g = inequalities(structure, s)
-    last = ca.Function(
-        "terminal_cost",
-        [s.x, s.stage, s.theta, s.multipliers],
-        [augmented_residuals(structure, s, True)[2], ca.densify(g)],
-    )
-
-    x0, u_before, length = ca.MX.sym("x0", NX), ca.MX.sym("u_before", NU), ca.MX.sym("alpha")
-    X, U = ca.MX.sym("X", NX, N + 1), ca.MX.sym("U", NU, N)
-    gains, steps = ca.MX.sym("gains", NU, NZ * N), ca.MX.sym("step", NU, N)
-    stages, theta = ca.MX.sym("stages", structure.stage_size, N + 1), ca.MX.sym("theta", THETA_SIZE)
-    multipliers = ca.MX.sym("multipliers", structure.inequalities, N + 1)
-    lam = ca.horzsplit(multipliers)
-    xs, us, data, ks = (
-        ca.horzsplit(X),
-        ca.horzsplit(U),
-        ca.horzsplit(stages),
-        ca.horzsplit(gains, NZ),
-    )
-    step_k = ca.horzsplit(steps)
-    x, before, before_nominal, total = x0, u_before, u_before, 0
-    X_new, U_new, G = [x0], [], []
-    for k in range(N):
-        x, u, cost, g = inner(
-            x,
-            before,
-            xs[k],
-            us[k],
-            before_nominal,
-            ks[k],
-            step_k[k],
-            length,
-            data[k],
-            theta,
-            lam[k],
-        )
-        before, before_nominal, total = u, us[k], total + cost
-        X_new.append(x)
-        U_new.append(u)
-        G.append(g)
-    cost, g = last(x, data[N], theta, lam[N])
-    total += cost
-    return ca.Function(
-        "forward",
-        [x0, u_before, X, U, gains, steps, length, stages, theta, multipliers],
-        [ca.horzcat(*X_new), ca.horzcat(*U_new), total, ca.horzcat(*G, g)],
-        ["x0", "u_before", "X", "U", "gains", "step", "alpha", "stages", "theta", "multipliers"],
-        ["X_new", "U_new", "cost", "inequalities"],
-    )
+def _by_rate(at_low: ca.SX, at_high: ca.SX, low: ca.SX, high: ca.SX, s: Symbols) -> ca.SX:
+    """Return which inputs (4,) are on a bound of their rate, and so follow the input before."""
+    return ca.logic_or(ca.logic_and(at_low, low > s.u_min), ca.logic_and(at_high, high < s.u_max))
 
 
-def _hessian(
-    r: ca.SX, w: ca.SX, lagrangian: Optional[ca.SX], z: ca.SX, u: ca.SX
-) -> Tuple[ca.SX, ca.SX, ca.SX]:
-    """Return the blocks zz, uz, uu of the Hessian of w'r^2 (+ adjoint' F).
-
-    Exact, or Gauss-Newton without F.
-    """
-    if lagrangian is not None:
-        both = ca.vertcat(z, u)
-        H = ca.hessian(lagrangian, both)[0]
-        return H[:NZ, :NZ], H[NZ:, :NZ], H[NZ:, NZ:]
-    Jz, Ju, W = ca.jacobian(r, z), ca.jacobian(r, u), ca.diag(w)
-    return 2 * Jz.T @ (W @ Jz), 2 * Ju.T @ (W @ Jz), 2 * Ju.T @ (W @ Ju)
+def _free_step(Q: ca.SX, q: ca.SX, free: ca.SX, fixed: ca.SX) -> Tuple[ca.SX, ca.SX, List[ca.SX]]:
+    """Return the step (4,) least in d'Qd/2 + q'd with some of it fixed, and the factor of Q."""
+    F = ca.diag(free)
+    L, pivots = cholesky(F @ Q @ F + ca.diag(1 - free))
+    return fixed - solve(L, free * (q + Q @ fixed)), L, pivots

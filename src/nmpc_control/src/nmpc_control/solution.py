@@ -15,8 +15,9 @@ class Guess:
 
     states: np.ndarray  # (N + 1, 10)
     inputs: np.ndarray  # (N, 4)
-    gains: Optional[np.ndarray] = None  # (N, 4, 14) feedback on state and previous input
+    gains: Optional[np.ndarray] = None  # (N, 14, 4) feedback on x and u_before, transposed
     multipliers: Optional[np.ndarray] = None  # (N + 1, nc) of the softened inequalities
+    cost: float = np.inf  # of the solution that it comes from
 
 
 @dataclass(frozen=True)
@@ -34,13 +35,13 @@ class Solution:
     solve_time: float  # [s] wall time
     violation: float = 0.0  # [m] or [m/s] by which a softened bound is exceeded most
     softened: str = ""  # which kind of bound that is; empty while all hold
-    gains: Optional[np.ndarray] = None  # (N, 4, 14) feedback on state and previous input
+    gains: Optional[np.ndarray] = None  # (N, 14, 4) feedback on x and u_before, transposed
     multipliers: Optional[np.ndarray] = None  # (N + 1, nc) of the softened inequalities
 
     @property
     def guess(self) -> Guess:
         """The solution as a guess for the next solve."""
-        return Guess(self.states, self.inputs, self.gains, self.multipliers)
+        return Guess(self.states, self.inputs, self.gains, self.multipliers, self.cost)
 
 
 def cold_guess(x0: np.ndarray, horizon: int) -> Guess:
@@ -66,7 +67,7 @@ def shift(guess: Guess, stages: float) -> Guess:
     multipliers = guess.multipliers
     if multipliers is not None:
         multipliers = multipliers[np.minimum(np.round(np.arange(N + 1) + stages).astype(int), N)]
-    return Guess(states, inputs, gains, multipliers)
+    return Guess(states, inputs, gains, multipliers, guess.cost)
 
 
 def worst_violation(g: np.ndarray, kinds: Sequence[str], tolerance: float) -> Tuple[float, str]:

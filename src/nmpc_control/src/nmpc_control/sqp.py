@@ -1,212 +1,310 @@
 # SPDX-License-Identifier: MIT
-"""The compiled backend: projected Gauss-Newton with Riccati sweeps, every iterate feasible.
+"""The compiled backend: projected Newton with Riccati sweeps, every iterate feasible.
 
-One iteration is a backward sweep (gradient, active bounds, Newton step with feedback; ``riccati``)
-and a
-rollout along it, shortened until the cost falls enough (Armijo), with Levenberg damping where no
-length
-helps. Because dynamics and bounds hold exactly at every iterate, the cost itself is the merit
-function and
-a solve cut off by its wall-time budget still returns a plan that can be flown. Inequalities beside
-the input bounds
-enter by an augmented Lagrangian whose multipliers, bounded by the weight of the L1 penalty, are
-updated whenever the
-inner iteration has converged.
+One iteration is a backward sweep (``riccati``: gradient, active bounds, Newton step with feedback)
+and a rollout along it (``rollout``), shortened until the cost falls enough (Armijo), with Levenberg
+damping where no length helps. Because dynamics and input bounds hold exactly at every iterate, the
+cost itself is the merit function, and a solve cut off by its wall-time budget still returns a plan
+that can be flown. The other inequalities enter by an augmented Lagrangian whose multipliers,
+bounded by the weight of the L1 penalty, are updated whenever the inner iteration has converged.
 """
 
-import logging
 import time
-from typing import Dict, Optional, Tuple
+from dataclasses import dataclass
+from typing import Dict, List, NamedTuple, Optional, Tuple
 
+import casadi as ca
 import numpy as np
 
-from nmpc_control import constraints
+from nmpc_control.augmented import MAXIMA
 from nmpc_control.compiled_function import Buffered, compile_functions
 from nmpc_control.ocp import Instance, Structure
-from nmpc_control.riccati import NZ, sweeps
+from nmpc_control.riccati import NZ, backward
+from nmpc_control.rollout import forward, settle
 from nmpc_control.solution import Guess, Solution, cold_guess, worst_violation
-from nmpc_control.state import NU
+from nmpc_control.state import NU, NX, YAW
 
-LOGGER = logging.getLogger(__name__)
 _ARMIJO = 1e-4
 _NEWTON_REGION = 0.02  # relative change of the cost below which the exact Hessian is tried
 _LEAST_PIVOT = 1e-6
 _SHORTEST_STEP = 1.0 / 64.0
+_MORE = 1.3  # times its promise: a step that brings so much is tried at double length
 _DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
-_DECREASE = (
-    1e-3  # times tolerance: a smaller predicted change of the cost, relative, counts as none
-)
+_EXCESS = 0.1  # [m], [m/s] times the root of the tolerance: a bound may be exceeded by this
+# a full step is trusted to leave at best this part of what it promised, depending on whether it
+# changes the set of active bounds
+_LEFT_SAME, _LEFT_CHANGED = 1e-3, 5e-2
+_FIRST_ACCURACY = 1e-3  # relative decrease below which the multipliers are first updated
+_ROUNDING = 1e-10  # a smaller promise, relative, is rounding
+_BAD_GUESS = 2.0  # times the cost that the guess had where it comes from
 _SHOWN = 2e-3  # [m], [m/s] by which a softened bound must be exceeded to be reported
-_FIRST_ACCURACY = (
-    1e-3  # predicted relative change of the cost at which the multipliers are first updated
-)
-_ROUNDING = 1e-9  # a smaller predicted change, relative, is rounding
+
+
+class Step(NamedTuple):
+    """What a backward sweep says of its step."""
+
+    promise: float  # by how much the cost falls by the full step, to second order
+    slope: float  # of the cost along the step
+    residual: float  # largest projected gradient, scaled by the input ranges
+    active: int  # inputs on a bound
+    changed: bool  # whether the step takes inputs to a bound or away from one
+
+
+@dataclass
+class Model:
+    """Which model of the cost the next step is taken from."""
+
+    newton: bool  # the exact Hessian, where it is positive; else Gauss-Newton
+    damping: float = 0.0
+    refusals: int = 0  # in a row, of the exact Hessian
+    pause: int = 0  # iterations without trying it again
+
+    def refused(self) -> None:
+        """Let some steps pass before the exact Hessian is tried again."""
+        self.refusals += 1
+        self.pause = 2**self.refusals - 1
+
+    def succeeded(self, decrease: float) -> None:
+        """Choose the next model after a step that lowered the cost by a part of itself."""
+        self.damping = self.damping / _DAMPING_FACTOR if self.damping > _DAMPING_FIRST else 0.0
+        self.pause = max(0, self.pause - 1)
+        self.newton = decrease <= _NEWTON_REGION and self.pause == 0
+
+    def failed(self) -> None:
+        """Take a more careful model after a step of which no length lowered the cost."""
+        self.damping = max(self.damping * _DAMPING_FACTOR, _DAMPING_FIRST)
+        self.newton = False
+
+
+def sweeps(structure: Structure) -> List[ca.Function]:
+    """Return the functions that are compiled for a structure."""
+    both = [backward(structure, exact) for exact in (False, True)]
+    return [*both, forward(structure), settle(structure)]
 
 
 class SqpSolver:
-    """Solver of one problem structure; call ``solve`` from one thread at a time."""
+    """Solver of one problem structure; call ``solve`` from one thread at a time.
+
+    Args:
+        structure: of the problem.
+        tolerance: [1] part of the cost (plus 1) that may be left to gain.
+        max_iterations: Newton steps at most.
+        time_budget: [s] wall time after which no further step is begun.
+    """
 
     def __init__(
         self, structure: Structure, tolerance: float, max_iterations: int, time_budget: float
     ) -> None:
         self.structure = structure
-        self.tolerance, self.max_iterations, self.time_budget = (
-            tolerance,
-            max_iterations,
-            time_budget,
-        )
+        self.tolerance, self.max_iterations = tolerance, max_iterations
+        self.time_budget = time_budget
         functions = compile_functions(sweeps(structure))
         self._arrays: Dict[str, np.ndarray] = {}
-        self._backward = Buffered(functions["backward"], self._arrays)
-        self._backward_exact = Buffered(functions["backward_exact"], self._arrays)
-        self._forward = Buffered(functions["forward"], self._arrays)
-        self._kinds = constraints.rows(structure.obstacle_slots)
-        self._curvature = constraints.curvature(structure.obstacle_slots)[:, None]
-        self._inequalities = np.zeros_like(self._arrays["inequalities"])
+        calls = {name: Buffered(f, self._arrays) for name, f in functions.items()}
+        self._backward, self._backward_exact = calls["backward"], calls["backward_exact"]
+        self._forward, self._settle = calls["forward"], calls["settle"]
+        self._tracking, self._penalties = np.inf, 0.0  # cost of the iterate
+        self._forced = False  # whether any multiplier is not zero
 
     def solve(self, instance: Instance, guess: Optional[Guess] = None) -> Solution:
-        """Return the solution from a guess, or from hover where there is none or it is useless.
+        """Return the solution from a guess; a useless one counts as none.
 
         Args:
             instance: the numbers of the problem.
-            guess: e.g. the last solution, shifted.
+            guess: e.g. the last solution, shifted; None: from hover or toward the reference,
+                whichever is better.
         """
         start = time.perf_counter()
         a = self._arrays
         a["x0"][:, 0], a["u_before"][:, 0] = instance.x0, instance.u_before
         a["stages"][:], a["theta"][:, 0] = instance.stages, instance.theta
-        cost = self._begin(guess, instance)
-        damping, iterations, status, residual, active = 0.0, 0, "failed", np.inf, 0
-        newton, accuracy, final = False, _FIRST_ACCURACY, _DECREASE * self.tolerance
+        cost, model = self._begin(instance, guess)
+        accuracy, excess = _FIRST_ACCURACY, _EXCESS * self.tolerance**0.5
+        iterations, status, step = 0, "failed", Step(np.inf, -np.inf, np.inf, 0, False)
         while np.isfinite(cost):
-            slope, residual, active = self._direction(damping, newton)
-            if residual <= self.tolerance or -slope <= accuracy * (1.0 + abs(cost)):
-                moved = self._update_multipliers(instance.soft_weight)
-                if moved <= self.tolerance and (residual <= self.tolerance or accuracy <= final):
-                    status = "converged"
-                    break
-                accuracy = final if moved <= self.tolerance else max(final, accuracy / 10.0)
-                if moved > 0.0:
-                    cost = self._evaluate()
-                    slope, residual, active = self._direction(damping, newton)
-            if iterations >= self.max_iterations or time.perf_counter() - start > self.time_budget:
+            late = time.perf_counter() - start > self.time_budget
+            if iterations >= self.max_iterations or late:
                 status = "budget"
                 break
-            iterations += 1
-            new_cost = self._search(cost, slope)
-            if new_cost is not None:
-                newton = cost - new_cost <= _NEWTON_REGION * (1.0 + abs(cost))
-                cost, damping = (
-                    new_cost,
-                    damping / _DAMPING_FACTOR if damping > _DAMPING_FIRST else 0.0,
-                )
-            elif slope > -_ROUNDING * (1.0 + abs(cost)) or damping >= _DAMPING_LAST:
-                status = "stalled"
-                break
-            else:
-                damping, newton = max(damping * _DAMPING_FACTOR, _DAMPING_FIRST), False
-        violation, softened = worst_violation(self._inequalities.T, self._kinds, _SHOWN)
+            step = self._direction(model)
+            scale = 1.0 + self._tracking
+            left, stationary = step.promise / scale, step.residual <= self.tolerance
+            if left > self.tolerance and not stationary:
+                iterations += 1
+                new_cost, alpha = self._search(cost, step)
+                if new_cost is None and (left < _ROUNDING or model.damping >= _DAMPING_LAST):
+                    status = "stalled"
+                    break
+                if new_cost is None:
+                    model.failed()
+                    continue
+                full = alpha == 1.0 and model.damping == 0.0
+                left = _left(step, cost - new_cost) / scale if full else np.inf
+                model.succeeded((cost - new_cost) / scale)
+                cost = new_cost
+            if left <= accuracy or stationary:
+                moved, cost = self._update_multipliers(cost)
+                if moved <= excess and (left <= self.tolerance or stationary):
+                    status = "converged"
+                    break
+                tighter = 0.0 if moved <= excess else accuracy / 10.0
+                accuracy = max(self.tolerance, tighter)
+        violation, softened, objective = self._statement()
         return Solution(
             found=bool(np.isfinite(cost)),
             status=status,
             states=a["X"].T.copy(),
             inputs=a["U"].T.copy(),
-            cost=self._objective(cost, instance.soft_weight),
+            cost=objective,
             iterations=iterations,
-            kkt_residual=float(residual),
-            active_bounds=int(active),
+            kkt_residual=step.residual,
+            active_bounds=step.active,
             solve_time=time.perf_counter() - start,
             violation=violation,
             softened=softened,
-            gains=a["gains"].T.reshape(-1, NZ, NU).transpose(0, 2, 1).copy(),
+            gains=a["gains"].T.reshape(-1, NZ, NU).copy(),
             multipliers=a["multipliers"].T.copy(),
         )
 
-    def _begin(self, guess: Optional[Guess], instance: Instance) -> float:
-        """Roll the guess out from x0.
-
-        Fall back to hover when that is not finite. Returns the cost.
-        """
-        a = self._arrays
-        for warm in (True, False):
-            candidate = guess if warm else cold_guess(instance.x0, self.structure.horizon)
-            if candidate is None or not np.all(np.isfinite(candidate.inputs)):
-                continue
-            a["X"][:], a["U"][:] = candidate.states.T, candidate.inputs.T
-            if candidate.gains is None:
-                a["gains"][:] = 0.0
-            else:
-                a["gains"][:] = candidate.gains.transpose(0, 2, 1).reshape(-1, NU).T
-            a["multipliers"][:] = 0.0 if candidate.multipliers is None else candidate.multipliers.T
-            cost = self._evaluate()
-            if np.isfinite(cost):
+    def _begin(self, instance: Instance, guess: Optional[Guess]) -> Tuple[float, Model]:
+        """Set the first iterate; return its cost and the first model."""
+        trials = []
+        if guess is not None and np.all(np.isfinite(guess.inputs)):
+            self._load(guess.states, guess.inputs, guess.gains, guess.multipliers)
+            cost = self._evaluate(0.0)
+            if cost <= _BAD_GUESS * (1.0 + guess.cost):
                 self._accept()
-                return cost
-        return np.inf
+                return cost, Model(newton=guess.gains is not None)
+            trials.append(self._trial())
+        hover = cold_guess(instance.x0, self.structure.horizon)
+        self._load(hover.states, hover.inputs)
+        self._evaluate(0.0)
+        trials.append(self._trial())
+        # toward the reference, under the feedback law of the problem linearised there
+        states = instance.stages[:NX].T.copy()
+        states[:, YAW] = np.unwrap(np.r_[instance.x0[YAW], states[:, YAW]])[1:]
+        self._load(states, instance.stages[NX : NX + NU, :-1].T)
+        self._direction(Model(newton=False))
+        for alpha in (0.0, 1.0):
+            self._evaluate(alpha)
+            trials.append(self._trial())
+        trials = [trial for trial in trials if np.isfinite(trial[0])]
+        if not trials:
+            return np.inf, Model(False)
+        _, X, U = min(trials, key=lambda trial: trial[0])
+        self._load(X, U)
+        cost = self._evaluate(0.0)
+        self._accept()
+        return cost, Model(newton=False)
 
-    def _evaluate(self) -> float:
-        """Return the cost of the present iterate, rolled out with its feedback."""
-        self._arrays["alpha"][0, 0] = 0.0
+    def _load(
+        self,
+        states: np.ndarray,
+        inputs: np.ndarray,
+        gains: Optional[np.ndarray] = None,
+        multipliers: Optional[np.ndarray] = None,
+    ) -> None:
+        """Set the iterate that the sweeps start from."""
+        a = self._arrays
+        a["X"][:], a["U"][:] = states.T, inputs.T
+        a["gains"][:] = 0.0 if gains is None else gains.reshape(-1, NU).T
+        a["multipliers"][:] = 0.0 if multipliers is None else multipliers.T
+        self._forced = multipliers is not None and bool(multipliers.any())
+
+    def _evaluate(self, alpha: float) -> float:
+        """Roll out under the law with a step length; return the augmented cost."""
+        self._arrays["alpha"][0, 0] = alpha
         self._forward()
-        return float(self._arrays["cost"][0, 0])
+        return float(self._arrays["cost"].sum())
 
-    def _objective(self, augmented: float, weight: float) -> float:
-        """Return the problem's own cost.
+    def _trial(self) -> Tuple[float, np.ndarray, np.ndarray]:
+        a = self._arrays
+        return float(a["cost"].sum()), a["X_new"].T.copy(), a["U_new"].T.copy()
 
-        Tracking and potentials plus the L1 penalty on the inequalities.
-        """
-        g, mu = self._inequalities, self._curvature
-        excess = np.maximum(0.0, g + self._arrays["multipliers"] / mu)
-        linear = weight * excess - weight**2 / (2 * mu)
-        penalty = np.where(mu * excess <= weight, mu / 2 * excess**2, linear)
-        return float(augmented - np.sum(penalty) + weight * np.sum(np.maximum(0.0, g)))
-
-    def _update_multipliers(self, weight: float) -> float:
-        """Move the multipliers by the inequalities at the iterate.
-
-        Returns the largest move, as an excess.
-        """
-        old = self._arrays["multipliers"]
-        new = np.clip(old + self._curvature * self._inequalities, 0.0, weight)
-        moved = float(np.max(np.abs(new - old) / self._curvature))
-        old[:] = new
-        return moved
-
-    def _direction(self, damping: float, newton: bool) -> Tuple[float, float, int]:
-        """Compute step and gains.
-
-        Returns the slope along the step, projected gradient and active bounds.
-
-        Near a solution (``newton``) the exact Hessian converges fast; where it is not positive,
-        Gauss-Newton is used.
-        """
-        self._arrays["damping"][0, 0] = damping
-        slope, residual, active, pivot = 0.0, np.inf, 0, 0.0
-        if newton:
+    def _direction(self, model: Model) -> Step:
+        """Compute step and gains, by the exact Hessian if that is wanted and positive."""
+        self._arrays["damping"][0, 0] = model.damping
+        if model.newton:
             self._backward_exact()
-            slope, residual, active, pivot = self._arrays["summary"][:, 0]
-        if not pivot > _LEAST_PIVOT or not slope <= 0.0:
+            slope, promise, residual, active, pivot, changed = self._summary()
+            if not (pivot > _LEAST_PIVOT and slope <= 0.0):
+                model.refused()
+                model.newton = False
+            else:
+                model.refusals = 0
+        if not model.newton:
             self._backward()
-            slope, residual, active, _ = self._arrays["summary"][:, 0]
-        return slope, residual, active
+            slope, promise, residual, active, _, changed = self._summary()
+        return Step(promise, slope, residual, int(active), changed > 0)
 
-    def _search(self, cost: float, slope: float) -> Optional[float]:
+    def _summary(self) -> List[float]:
+        return self._arrays["summary"][:, 0].tolist()
+
+    def _search(self, cost: float, step: Step) -> Tuple[Optional[float], float]:
         """Take the longest of the tried steps that lowers the cost enough.
 
-        None when there is none.
+        A full step that brings more than it promised is lengthened: around an obstacle the convex
+        model sees too much curvature. Returns the new cost, None when there is none, and the
+        step's length.
         """
         alpha = 1.0
         while alpha >= _SHORTEST_STEP:
-            self._arrays["alpha"][0, 0] = alpha
-            self._forward()
-            new_cost = float(self._arrays["cost"][0, 0])
-            if new_cost <= cost + _ARMIJO * alpha * slope:
+            new_cost = self._evaluate(alpha)
+            if new_cost <= cost + _ARMIJO * alpha * step.slope:
                 self._accept()
-                return new_cost
+                break
             alpha /= 2.0
-        return None
+        else:
+            return None, alpha
+        while alpha >= 1.0 and cost - new_cost > _MORE * alpha * step.promise:
+            longer = self._evaluate(2.0 * alpha)
+            if not longer < new_cost:
+                break
+            self._accept()
+            alpha, new_cost = 2.0 * alpha, longer
+        return new_cost, alpha
 
     def _accept(self) -> None:
         a = self._arrays
         a["X"][:], a["U"][:] = a["X_new"], a["U_new"]
-        self._inequalities[:] = a["inequalities"]
+        self._tracking, self._penalties = a["cost"][:, 0].tolist()
+
+    @property
+    def _quiet(self) -> bool:
+        """Whether no softened bound is felt at the iterate."""
+        return self._penalties == 0.0 and not self._forced
+
+    def _update_multipliers(self, cost: float) -> Tuple[float, float]:
+        """Move the multipliers by the inequalities at the iterate.
+
+        Returns the largest move, as an excess, and the cost with the new ones.
+        """
+        if self._quiet:
+            return 0.0, cost
+        a = self._arrays
+        self._settle()
+        a["multipliers"][:] = a["multipliers_new"]
+        self._forced = bool(a["multipliers"].any())
+        self._penalties = float(a["sums"][0, 0])
+        return float(a["maxima"][0, 0]), self._tracking + self._penalties
+
+    def _statement(self) -> Tuple[float, str, float]:
+        """Return the worst violation, its kind, and the problem's own cost at the iterate."""
+        if self._quiet:
+            return 0.0, "", self._tracking
+        self._settle()
+        worst = self._arrays["maxima"][1:, 0]
+        violation, kind = worst_violation(worst[None], MAXIMA[1:], _SHOWN)
+        return violation, kind, self._tracking + float(self._arrays["sums"][1, 0])
+
+
+def _left(step: Step, decrease: float) -> float:
+    """Return an estimate of what the cost can still fall by after a full step.
+
+    What the model missed, ``promise - decrease``, is a term of third order T d^3 / 6; the gradient
+    that the step leaves is T d^2 / 2, and a Newton step on that lowers the cost by half its square
+    over the curvature. With d^2 times curvature = 2 promise, this is (9 / 4) missed^2 / promise.
+    """
+    missed = abs(step.promise - decrease)
+    least = (_LEFT_CHANGED if step.changed else _LEFT_SAME) * step.promise
+    return max(9.0 / 4.0 * missed**2 / max(step.promise, 1e-300), least)

@@ -46,7 +46,7 @@ def structure_of(parameters: Parameters) -> Structure:
     return Structure(p.horizon, p.dt, p.integrator, p.obstacle_slots)
 
 
-def exact_solver(structure: Structure, tolerance: float = 1e-3) -> SqpSolver:
+def exact_solver(structure: Structure, tolerance: float = 1e-6) -> SqpSolver:
     """Return the compiled solver without budget: what it solves does not depend on the load."""
     return SqpSolver(structure, tolerance, 200, 30.0)
 
