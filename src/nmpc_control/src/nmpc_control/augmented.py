@@ -23,7 +23,7 @@ SUMS = ("updated", "exact")
 MAXIMA = ("moved", constraints.SPEED, constraints.FENCE, constraints.OBSTACLE)
 
 
-def penalty(g: ca.SX, multipliers: ca.SX, inverse_mu: ca.DM, rho: ca.SX) -> ca.SX:
+def penalty(g: ca.SX, multipliers: ca.SX, inverse_mu: ca.SX, rho: ca.SX) -> ca.SX:
     """Return the augmented penalties of inequalities g (n,) with their multipliers (n,)."""
     excess = ca.fmax(0, g + multipliers * inverse_mu)
     bent = ca.fmin(excess, rho * inverse_mu)  # up to here quadratic, beyond linear
@@ -38,7 +38,7 @@ class Settled(NamedTuple):
     multipliers: ca.SX  # (n,) the new ones
 
 
-def settled(g: ca.SX, multipliers: ca.SX, inverse_mu: ca.DM, rho: ca.SX) -> Settled:
+def settled(g: ca.SX, multipliers: ca.SX, inverse_mu: ca.SX, rho: ca.SX) -> Settled:
     """Move the multipliers (n,) by the inequalities g (n,)."""
     new = ca.fmin(ca.fmax(0, multipliers + g / inverse_mu), rho)
     updated, exact = penalty(g, new, inverse_mu, rho), rho * ca.fmax(0, g)
@@ -94,8 +94,9 @@ def settle_pilot_bounds(structure: Structure) -> ca.Function:
     )
 
 
-def _pilot_bounds(s: Symbols) -> Tuple[ca.SX, ca.SX, ca.DM, ca.SX]:
+def _pilot_bounds(s: Symbols) -> Tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """Return g, multipliers, 1 / mu (7,) each, and rho of speed and fence."""
     g = constraints.pilot_bounds(s.x[:3], s.x[6:9], s.bounds)
     multipliers = s.multipliers[: constraints.PILOT_BOUNDS]
-    return g, multipliers, 1 / ca.DM(constraints.curvature(0)), s.bounds["soft_weight"]
+    mu = ca.DM(constraints.curvature(0)) * s.bounds["stiffness"]
+    return g, multipliers, 1 / mu, s.bounds["soft_weight"]

@@ -2,13 +2,14 @@
 """The controller's optimiser: poses the problem of ``ocp``, keeps the warm start, returns plans."""
 
 from dataclasses import replace
-from typing import List, Optional, Sequence, Union
+from typing import Optional, Sequence, Union
 
 import numpy as np
 
 from nmpc_control.ipopt import IpoptSolver
-from nmpc_control.ocp import SLOT_SIZE, Instance, Structure, pack_stages, pack_theta
+from nmpc_control.ocp import Instance, Structure, pack_stages, pack_theta
 from nmpc_control.params import Parameters
+from nmpc_control.slots import Slots
 from nmpc_control.solution import Guess, Solution, shift
 from nmpc_control.sqp import SqpSolver
 from nmpc_control.state import GRAVITY, Obstacle, Plan, hover_input
@@ -27,6 +28,7 @@ class Nmpc:
         )
         self._last: Optional[Solution] = None
         self._last_t = 0.0
+        self._obstacle_slots = Slots()
         self._disturbance = np.zeros(3)
         self._theta = self._pack_theta(parameters)
 
@@ -105,27 +107,13 @@ class Nmpc:
             return None
         return shift(self._last.guess, stages)
 
-    def _slots(self, t: float, obstacles: Sequence[Obstacle], path: np.ndarray) -> List[np.ndarray]:
-        """Return slot data (N + 1, 5) of the obstacles that come nearest to the path (N + 1, 3)."""
-        if not self.parameters.avoidance.enabled:
-            return []
-        times = self.stage_times(t)
-        margin = self.parameters.vehicle.radius + self.parameters.avoidance.safety_distance
-        if self.parameters.avoidance.term == "potential":
-            margin += self.parameters.avoidance.inflation  # it acts only inside its reach
-        ranked = []
-        for obstacle in obstacles:
-            centres = np.array([obstacle.position_at(s) for s in times])
-            vertical, radius = 1.0, obstacle.size[0]
-            if obstacle.shape == "cylinder":
-                vertical = 0.0
-            elif obstacle.shape == "box":
-                radius = 0.5 * float(np.linalg.norm(obstacle.size))
-            slot = np.empty((len(times), SLOT_SIZE))
-            slot[:, :3], slot[:, 3], slot[:, 4] = centres, vertical, 1.0 / (radius + margin)
-            offset = (path - centres) * [1.0, 1.0, np.sqrt(vertical)]
-            ranked.append(
-                (float(np.min(np.linalg.norm(offset, axis=1)) - radius), len(ranked), slot)
-            )
-        ranked.sort(key=lambda item: item[:2])
-        return [slot for _, _, slot in ranked[: self.structure.obstacle_slots]]
+    def _slots(self, t: float, obstacles: Sequence[Obstacle], path: np.ndarray) -> np.ndarray:
+        """Return the slot data of the obstacles nearest to the path (N + 1, 3)."""
+        avoidance = self.parameters.avoidance
+        if not avoidance.enabled:
+            obstacles = ()
+        margin = self.parameters.vehicle.radius + avoidance.safety_distance
+        if avoidance.term == "potential":
+            margin += avoidance.inflation  # it acts only inside its reach
+        slots = self.structure.obstacle_slots
+        return self._obstacle_slots.fill(obstacles, self.stage_times(t), path, margin, slots)

@@ -23,7 +23,7 @@ from nmpc_control.ocp import (
 from nmpc_control.state import NU, NX
 
 _BLOCK = 8
-_NU = 1 / float(constraints.curvature(1)[-1])  # 1 / mu
+_MU = float(constraints.curvature(1)[-1])
 Terms = Callable[[ca.SX, List[ca.SX], ca.SX, ca.SX], List[ca.SX]]
 
 
@@ -31,10 +31,12 @@ def value(structure: Structure) -> ca.Function:
     """Return (x, stage, theta, multipliers) -> potentials and penalties (2,)."""
 
     def terms(p: ca.SX, slots: List[ca.SX], theta: ca.SX, multipliers: ca.SX) -> List[ca.SX]:
-        eta, rho, hard = _parts(theta)
+        eta, rho, hard, inverse_mu = _parts(theta)
         d = [distance(p, slot) for slot in slots]
         total = sum(potential(d_i, slot, eta) for d_i, slot in zip(d, slots))
-        return [ca.vertcat(total, ca.sum1(penalty(_g(d, slots, hard), multipliers, _NU, rho)))]
+        return [
+            ca.vertcat(total, ca.sum1(penalty(_g(d, slots, hard), multipliers, inverse_mu, rho)))
+        ]
 
     return _in_blocks(structure, "obstacle_value", terms, ["sum"])
 
@@ -43,9 +45,9 @@ def settle(structure: Structure) -> ca.Function:
     """Return (x, stage, theta, multipliers) -> sums, maxima, new multipliers of the slots."""
 
     def terms(p: ca.SX, slots: List[ca.SX], theta: ca.SX, multipliers: ca.SX) -> List[ca.SX]:
-        _, rho, hard = _parts(theta)
+        _, rho, hard, inverse_mu = _parts(theta)
         g = _g([distance(p, slot) for slot in slots], slots, hard)
-        result = augmented.settled(g, multipliers, _NU, rho)
+        result = augmented.settled(g, multipliers, inverse_mu, rho)
         maxima = ca.vertcat(result.moved, 0, 0, ca.fmax(0, ca.mmax(g)))
         return [result.sums, maxima, result.multipliers]
 
@@ -60,11 +62,11 @@ def derivatives(structure: Structure, exact: bool) -> ca.Function:
     """
 
     def terms(p: ca.SX, slots: List[ca.SX], theta: ca.SX, multipliers: ca.SX) -> List[ca.SX]:
-        eta, rho, hard = _parts(theta)
+        eta, rho, hard, inverse_mu = _parts(theta)
         gradient, H, d = ca.SX.zeros(3), ca.SX.zeros(3, 3), ca.SX.sym("d")
         for i, slot in enumerate(slots):
             g = constraints.obstacle(d, slot, hard)
-            cost = potential(d, slot, eta) + penalty(g, multipliers[i], _NU, rho)
+            cost = potential(d, slot, eta) + penalty(g, multipliers[i], inverse_mu, rho)
             here = distance(p, slot)
             curvature, force = ca.substitute([*ca.hessian(cost, d)], [d], [here])
             H_d, n = ca.hessian(here, p)
@@ -81,7 +83,9 @@ def _g(d: List[ca.SX], slots: List[ca.SX], hard: ca.SX) -> ca.SX:
 
 
 def _parts(theta: ca.SX) -> Sequence[ca.SX]:
-    return [theta[PARTS[name]] for name in ("eta", "soft_weight", "hard_obstacles")]
+    """Return eta, rho, whether Eq. 7 is selected, and 1 / mu."""
+    parts = [theta[PARTS[name]] for name in ("eta", "soft_weight", "hard_obstacles", "stiffness")]
+    return [*parts[:3], 1 / (_MU * parts[3])]
 
 
 def _in_blocks(
@@ -107,8 +111,8 @@ def _block(name: str, terms: Terms, size: int) -> Sequence[ca.Function]:
     x, theta = ca.SX.sym("x", NX), ca.SX.sym("theta", THETA_SIZE)
     data, multipliers = ca.SX.sym("slots", SLOT_SIZE * size), ca.SX.sym("l", size)
     slots = ca.vertsplit(data, SLOT_SIZE)
-    inside = [  # d < D + l / mu without root and division
-        squared_distance(x[:3], slot) * slot[4] ** 2 < (1 + multipliers[i] * _NU * slot[4]) ** 2
+    inside = [  # d < D + l / mu (with its least mu) without root and division
+        squared_distance(x[:3], slot) * slot[4] ** 2 < (1 + multipliers[i] * (slot[4] / _MU)) ** 2
         for i, slot in enumerate(slots)
     ]
     reach = ca.Function(f"{name}_reach", [x, data, multipliers], [ca.mmax(ca.vertcat(*inside))])

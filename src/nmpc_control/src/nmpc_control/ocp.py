@@ -43,6 +43,7 @@ _SIZES = {
     "input_rate": NU,  # [input unit per s]
     "soft_weight": 1,  # rho of the L1 penalty
     "hard_obstacles": 1,  # 1: Eq. 7 holds as an inequality; 0: it does not
+    "stiffness": 1,  # factor on the curvatures of the compiled solver's augmented Lagrangian
 }
 _ENDS = np.cumsum(list(_SIZES.values()))
 PARTS = {name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS)}
@@ -134,7 +135,7 @@ def pack_theta(
             limits.fence_min,
             limits.fence_max,
             limits.input_rate,
-            [limits.soft_weight, float(hard)],
+            [limits.soft_weight, float(hard), 1.0],
         ]
     )
     if not np.all(np.isfinite(theta)):
@@ -176,9 +177,11 @@ def pack_stages(
     data[:NX] = x_ref.T
     data[NX : NX + NU, :N] = np.broadcast_to(u_ref, (N, NU)).T
     data[NX : NX + NU, N] = data[NX : NX + NU, N - 1]
-    for i in range(structure.obstacle_slots):
-        rows = slice(NX + NU + SLOT_SIZE * i, NX + NU + SLOT_SIZE * (i + 1))
-        data[rows] = slots[i].T if i < len(slots) else np.array(EMPTY_SLOT)[:, None]
+    filled = NX + NU + SLOT_SIZE * len(slots)
+    for i, slot in enumerate(slots):
+        data[NX + NU + SLOT_SIZE * i : NX + NU + SLOT_SIZE * (i + 1)] = slot.T
+    empty = np.tile(EMPTY_SLOT, structure.obstacle_slots - len(slots))
+    data[filled:] = empty[:, None]
     if not np.all(np.isfinite(data)):
         raise ProblemError("references or obstacles: got a value that is not finite")
     return data

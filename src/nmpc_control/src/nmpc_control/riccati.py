@@ -36,15 +36,17 @@ _ACTIVE_TOLERANCE = 1e-9  # [input unit] distance at which an input counts as on
 def backward(structure: Structure, exact: bool) -> ca.Function:
     """Return the function ``backward`` or ``backward_exact``.
 
-    (X (10, N+1), U (4, N), u_before (4,), stages, theta, multipliers (nc, N+1), damping) ->
-    gains (4, 14 N), step (4, N), summary (6,). The exact Hessian of the Lagrangian need not be
+    (X (10, N+1), U (4, N), u_before (4,), stages, theta, multipliers (nc, N+1), damping,
+    clamping) -> gains (4, 14 N), step (4, N), summary (6,). With ``clamping`` 0 only held inputs
+    are fixed. The exact Hessian of the Lagrangian need not be
     positive: the least pivot says whether its step may be used.
     """
     N = structure.horizon
     last, inner = _terminal_model(structure, exact), _stage_backward(structure, exact)
     X, U = ca.MX.sym("X", NX, N + 1), ca.MX.sym("U", NU, N)
     u_before, stages = ca.MX.sym("u_before", NU), ca.MX.sym("stages", structure.stage_size, N + 1)
-    theta, damping = ca.MX.sym("theta", THETA_SIZE), ca.MX.sym("damping")
+    theta = ca.MX.sym("theta", THETA_SIZE)
+    damping, clamping = ca.MX.sym("damping"), ca.MX.sym("clamping")
     multipliers = ca.MX.sym("multipliers", structure.inequalities, N + 1)
     xs, us, data = ca.horzsplit(X), ca.horzsplit(U), ca.horzsplit(stages)
     forces = ca.horzsplit(multipliers)
@@ -61,13 +63,13 @@ def backward(structure: Structure, exact: bool) -> ca.Function:
         before = us[k - 1] if k else u_before
         here = [xs[k], us[k], before, data[k], theta, forces[k], gradients[k], hessians[k]]
         gains[k], step[k], P, s, adjoint, along, summary = inner(
-            *here, damping, P, s, adjoint, along, summary
+            *here, damping, clamping, P, s, adjoint, along, summary
         )
     return ca.Function(
         "backward_exact" if exact else "backward",
-        [X, U, u_before, stages, theta, multipliers, damping],
+        [X, U, u_before, stages, theta, multipliers, damping, clamping],
         [ca.horzcat(*gains), ca.horzcat(*step), summary],
-        ["X", "U", "u_before", "stages", "theta", "multipliers", "damping"],
+        ["X", "U", "u_before", "stages", "theta", "multipliers", "damping", "clamping"],
         ["gains", "step", "summary"],
     )
 
@@ -91,7 +93,7 @@ def _terminal_model(structure: Structure, exact: bool) -> ca.Function:
 def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
     s = Symbols(structure)
     obstacle_gradient, obstacle_hessian = ca.SX.sym("g", 3), ca.SX.sym("H", 6)
-    damping = ca.SX.sym("damping")
+    damping, clamping = ca.SX.sym("damping"), ca.SX.sym("clamping")
     P_half = ca.SX.sym("P", NZ * (NZ + 1) // 2)
     # gradients by the next state: of the model's value, of the cost, of the cost under the feedback
     value_gradient, adjoint, along = (ca.SX.sym(name, NZ) for name in ("s", "adjoint", "along"))
@@ -125,9 +127,10 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
     qz = cost_z + ca.vertcat(A.T @ value_gradient[:NX], ca.SX.zeros(NU))
 
     damped = Quu + damping * ca.SX.eye(NU)
-    tried = _free_step(damped, qu, 1 - ca.logic_or(held_low, held_high), ca.SX.zeros(NU))[0]
-    at_low = ca.logic_or(held_low, tried < low - s.u)
-    at_high = ca.logic_or(held_high, tried > high - s.u)
+    free = 1 - ca.logic_or(held_low, held_high)
+    tried, _, tried_pivots = _free_step(damped, qu, free, ca.SX.zeros(NU))
+    at_low = ca.logic_or(held_low, clamping * (tried < low - s.u))
+    at_high = ca.logic_or(held_high, clamping * (tried > high - s.u))
     free = 1 - ca.logic_or(at_low, at_high)
     fixed = ca.if_else(at_low, low - s.u, ca.if_else(at_high, high - s.u, 0))
     step, L, pivots = _free_step(damped, qu, free, fixed)
@@ -149,13 +152,13 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
         summary[1] - ca.dot(step, qu + Quu @ step / 2),
         ca.fmax(summary[2], violation),
         summary[3] + NU - ca.sum1(free),
-        ca.fmin(summary[4], ca.mmin(ca.vertcat(*pivots))),
+        ca.fmin(summary[4], ca.mmin(ca.vertcat(*pivots, *tried_pivots))),
         summary[5] + ca.sum1(ca.fabs(ca.logic_or(on_low, on_high) - (1 - free))),
     )
     return ca.Function(
         "stage_backward",
         [s.x, s.u, s.u_before, s.stage, s.theta, s.multipliers, obstacle_gradient]
-        + [obstacle_hessian, damping, P_half, value_gradient, adjoint, along, summary],
+        + [obstacle_hessian, damping, clamping, P_half, value_gradient, adjoint, along, summary],
         [ca.densify(gains), step, pack_symmetric(P_before)]
         + [s_before, adjoint_before, along_before, new_summary],
     )

@@ -18,8 +18,8 @@ import numpy as np
 
 from nmpc_control.augmented import MAXIMA
 from nmpc_control.compiled_function import Buffered, compile_functions
-from nmpc_control.ocp import Instance, Structure
-from nmpc_control.riccati import NZ, backward
+from nmpc_control.ocp import PARTS, Instance, Structure
+from nmpc_control.riccati import NZ, SUMMARY, backward
 from nmpc_control.rollout import forward, settle
 from nmpc_control.solution import Guess, Solution, cold_guess, worst_violation
 from nmpc_control.state import NU, NX, YAW
@@ -28,13 +28,15 @@ _ARMIJO = 1e-4
 _NEWTON_REGION = 0.02  # relative change of the cost below which the exact Hessian is tried
 _LEAST_PIVOT = 1e-6
 _SHORTEST_STEP = 1.0 / 64.0
-_MORE = 1.3  # times its promise: a step that brings so much is tried at double length
+_LESS, _MORE = 0.5, 1.3  # times its promise: what a step brings so that another length is tried
 _DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
 _EXCESS = 0.1  # [m], [m/s] times the root of the tolerance: a bound may be exceeded by this
-# a full step is trusted to leave at best this part of what it promised, depending on whether it
-# changes the set of active bounds
-_LEFT_SAME, _LEFT_CHANGED = 1e-3, 5e-2
+# a full step is trusted to leave at best this part of what it promised: by the exact Hessian with
+# the same active bounds, with others, by Gauss-Newton
+_LEFT_SAME, _LEFT_CHANGED, _LEFT_GAUSS_NEWTON = 1e-3, 5e-2, 0.5
 _FIRST_ACCURACY = 1e-3  # relative decrease below which the multipliers are first updated
+_SLOW = 0.25  # of the last move of the multipliers: if one is larger, the bounds get stiffer
+_STIFFER, _STIFFEST = 5.0, 1e4
 _ROUNDING = 1e-10  # a smaller promise, relative, is rounding
 _BAD_GUESS = 2.0  # times the cost that the guess had where it comes from
 _SHOWN = 2e-3  # [m], [m/s] by which a softened bound must be exceeded to be reported
@@ -48,6 +50,7 @@ class Step(NamedTuple):
     residual: float  # largest projected gradient, scaled by the input ranges
     active: int  # inputs on a bound
     changed: bool  # whether the step takes inputs to a bound or away from one
+    exact: bool = False  # whether the model has the exact Hessian
 
 
 @dataclass
@@ -61,6 +64,7 @@ class Model:
 
     def refused(self) -> None:
         """Let some steps pass before the exact Hessian is tried again."""
+        self.newton = False
         self.refusals += 1
         self.pause = 2**self.refusals - 1
 
@@ -119,7 +123,7 @@ class SqpSolver:
         a["x0"][:, 0], a["u_before"][:, 0] = instance.x0, instance.u_before
         a["stages"][:], a["theta"][:, 0] = instance.stages, instance.theta
         cost, model = self._begin(instance, guess)
-        accuracy, excess = _FIRST_ACCURACY, _EXCESS * self.tolerance**0.5
+        accuracy, excess, before = _FIRST_ACCURACY, _EXCESS * self.tolerance**0.5, np.inf
         iterations, status, step = 0, "failed", Step(np.inf, -np.inf, np.inf, 0, False)
         while np.isfinite(cost):
             late = time.perf_counter() - start > self.time_budget
@@ -149,6 +153,9 @@ class SqpSolver:
                     break
                 tighter = 0.0 if moved <= excess else accuracy / 10.0
                 accuracy = max(self.tolerance, tighter)
+                if moved > max(excess, _SLOW * before):
+                    cost = self._stiffen()
+                before = moved
         violation, softened, objective = self._statement()
         return Solution(
             found=bool(np.isfinite(cost)),
@@ -224,44 +231,57 @@ class SqpSolver:
     def _direction(self, model: Model) -> Step:
         """Compute step and gains, by the exact Hessian if that is wanted and positive."""
         self._arrays["damping"][0, 0] = model.damping
+        self._arrays["clamping"][0, 0] = 1.0
         if model.newton:
             self._backward_exact()
-            slope, promise, residual, active, pivot, changed = self._summary()
-            if not (pivot > _LEAST_PIVOT and slope <= 0.0):
-                model.refused()
-                model.newton = False
-            else:
+            if self._row("pivot") > _LEAST_PIVOT and self._descends():
                 model.refusals = 0
-        if not model.newton:
+                return self._step(exact=True)
+            model.refused()
+        self._backward()
+        if not self._descends():
+            # sent to bounds one by one, inputs can together do harm: then only hold those on one
+            self._arrays["clamping"][0, 0] = 0.0
             self._backward()
-            slope, promise, residual, active, _, changed = self._summary()
-        return Step(promise, slope, residual, int(active), changed > 0)
+        return self._step()
 
-    def _summary(self) -> List[float]:
-        return self._arrays["summary"][:, 0].tolist()
+    def _row(self, name: str) -> float:
+        return float(self._arrays["summary"][SUMMARY.index(name), 0])
+
+    def _descends(self) -> bool:
+        """Whether the step lowers the cost and its model, or there is nothing to lower."""
+        slope, promise, residual = self._arrays["summary"][:3, 0].tolist()
+        return (slope < 0.0 and promise > 0.0) or residual <= self.tolerance
+
+    def _step(self, exact: bool = False) -> Step:
+        slope, promise, residual, active, _, changed = self._arrays["summary"][:, 0].tolist()
+        return Step(promise, slope, residual, int(active), changed > 0, exact)
 
     def _search(self, cost: float, step: Step) -> Tuple[Optional[float], float]:
         """Take the longest of the tried steps that lowers the cost enough.
 
-        A full step that brings more than it promised is lengthened: around an obstacle the convex
-        model sees too much curvature. Returns the new cost, None when there is none, and the
-        step's length.
+        One that brings much less than promised is compared with half of it (between pieces of the
+        potential, full steps can go to and fro), one that brings more with its double (around an
+        obstacle the convex model sees too much curvature). Returns the new cost, None when there is
+        none, and the step's length.
         """
         alpha = 1.0
-        while alpha >= _SHORTEST_STEP:
-            new_cost = self._evaluate(alpha)
-            if new_cost <= cost + _ARMIJO * alpha * step.slope:
-                self._accept()
-                break
+        new_cost = self._evaluate(alpha)
+        while not new_cost <= cost + _ARMIJO * alpha * step.slope:
             alpha /= 2.0
-        else:
-            return None, alpha
-        while alpha >= 1.0 and cost - new_cost > _MORE * alpha * step.promise:
-            longer = self._evaluate(2.0 * alpha)
-            if not longer < new_cost:
+            if alpha < _SHORTEST_STEP:
+                return None, alpha
+            new_cost = self._evaluate(alpha)
+        self._accept()
+        gain = (cost - new_cost) / (alpha * step.promise)
+        factor = 0.5 if gain < _LESS else 2.0
+        while gain < _LESS or (gain > _MORE and alpha >= 1.0):
+            other = self._evaluate(factor * alpha)
+            if not other < new_cost:
                 break
             self._accept()
-            alpha, new_cost = 2.0 * alpha, longer
+            alpha, new_cost = factor * alpha, other
+            gain = (cost - new_cost) / (alpha * step.promise)
         return new_cost, alpha
 
     def _accept(self) -> None:
@@ -288,6 +308,14 @@ class SqpSolver:
         self._penalties = float(a["sums"][0, 0])
         return float(a["maxima"][0, 0]), self._tracking + self._penalties
 
+    def _stiffen(self) -> float:
+        """Raise the curvatures of the augmented Lagrangian; return the cost with them."""
+        stiffness = self._arrays["theta"][PARTS["stiffness"]]
+        stiffness[:] = np.minimum(stiffness * _STIFFER, _STIFFEST)
+        cost = self._evaluate(0.0)
+        self._accept()
+        return cost
+
     def _statement(self) -> Tuple[float, str, float]:
         """Return the worst violation, its kind, and the problem's own cost at the iterate."""
         if self._quiet:
@@ -306,5 +334,6 @@ def _left(step: Step, decrease: float) -> float:
     over the curvature. With d^2 times curvature = 2 promise, this is (9 / 4) missed^2 / promise.
     """
     missed = abs(step.promise - decrease)
-    least = (_LEFT_CHANGED if step.changed else _LEFT_SAME) * step.promise
+    part = _LEFT_CHANGED if step.changed else _LEFT_SAME
+    least = (part if step.exact else _LEFT_GAUSS_NEWTON) * step.promise
     return max(9.0 / 4.0 * missed**2 / max(step.promise, 1e-300), least)

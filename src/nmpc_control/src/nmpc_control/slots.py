@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""Which obstacles fill the slots of the problem: those that come nearest to the expected path."""
+
+from typing import List, Optional, Sequence
+
+import numpy as np
+
+from nmpc_control.ocp import SLOT_SIZE
+from nmpc_control.state import Obstacle
+
+
+class Slots:
+    """Obstacles as arrays; a message of hundreds is converted once and used for many solves."""
+
+    def __init__(self) -> None:
+        self._obstacles: Optional[Sequence[Obstacle]] = None
+
+    def fill(
+        self,
+        obstacles: Sequence[Obstacle],
+        times: np.ndarray,
+        path: np.ndarray,
+        margin: float,
+        count: int,
+    ) -> np.ndarray:
+        """Return slot data (at most count, N + 1, 5), see ``ocp.SLOT_SIZE``, nearest first.
+
+        Args:
+            obstacles: any number; a box counts as the sphere around it.
+            times: (N + 1,) [s] of the stages.
+            path: (N + 1, 3) [m] where the aircraft is expected at them.
+            margin: [m] least distance from an obstacle's surface.
+            count: number of slots.
+        """
+        if obstacles is not self._obstacles:
+            self._convert(obstacles)
+        if not len(obstacles):
+            return np.empty((0, len(times), SLOT_SIZE))
+        age = times - self._stamp[:, None]
+        centres = self._position[:, None] + age[..., None] * self._velocity[:, None]
+        offset = path - centres
+        offset[..., 2] *= self._vertical[:, None]
+        nearest = np.sqrt(np.einsum("ijk,ijk->ij", offset, offset).min(axis=1)) - self._radius
+        chosen = np.argsort(nearest, kind="stable")[:count]
+        data = np.empty((len(chosen), len(times), SLOT_SIZE))
+        data[..., :3] = centres[chosen]
+        data[..., 3] = self._vertical[chosen, None]
+        data[..., 4] = 1.0 / (self._radius[chosen, None] + margin)
+        return data
+
+    def _convert(self, obstacles: Sequence[Obstacle]) -> None:
+        self._obstacles = obstacles
+        moving = [o.stamp is not None for o in obstacles]
+        zero = np.zeros(3)
+        self._position = _rows([o.position for o in obstacles])
+        self._velocity = _rows([o.velocity if m else zero for o, m in zip(obstacles, moving)])
+        self._stamp = np.array([o.stamp if m else 0.0 for o, m in zip(obstacles, moving)])
+        self._vertical = np.array([o.shape != "cylinder" for o in obstacles], dtype=float)
+        self._radius = np.array(
+            [
+                0.5 * float(np.linalg.norm(o.size)) if o.shape == "box" else float(o.size[0])
+                for o in obstacles
+            ]
+        )
+
+
+def _rows(vectors: List[np.ndarray]) -> np.ndarray:
+    return np.array(vectors, dtype=float).reshape(-1, 3)
