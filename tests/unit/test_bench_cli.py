@@ -6,9 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nmpc_control.model import INTEGRATORS, reference_step, step_function
+from nmpc_control.params import load_vehicle
 from uav_sim.closed_loop.bench import cli
 from uav_sim.closed_loop.bench.agreement import Comparison, summary
 from uav_sim.closed_loop.bench.effort import QUICK
+from uav_sim.closed_loop.bench.integrators import errors
 from uav_sim.closed_loop.bench.laps import PRESETS, lap
 from uav_sim.closed_loop.bench.native import native_time, traced_calls
 from uav_sim.closed_loop.bench.objective import relative_gap
@@ -78,6 +81,16 @@ def test_calls_of_compiled_functions_are_traced_and_released():
 def test_gap_is_relative_to_the_best_cost():
     assert relative_gap(110.0, 100.0) == pytest.approx(0.1)
     assert relative_gap(2e-6, 1e-6) == pytest.approx(1e-3), "costs near zero are rounding"
+
+
+def test_integrators_are_told_apart_by_their_errors():
+    vehicle, exact = load_vehicle("paper"), reference_step(0.1)
+    fine, coarse = (errors(step_function(0.1, i), exact, vehicle, 0.1) for i in INTEGRATORS[::2])
+    assert fine[0] < 0.01
+    assert fine[1] < 0.001
+    assert coarse[0] > 1.0
+    assert coarse[1] > 10.0, "an Euler step of 0.1 s is unstable for the paper's lags"
+    assert errors(exact, exact, vehicle, 0.1) == (0.0, 0.0)
 
 
 def comparison(gap, input_gap, reached):

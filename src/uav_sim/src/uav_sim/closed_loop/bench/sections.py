@@ -9,7 +9,7 @@ from rich.progress import Progress
 
 from nmpc_control.params import load_parameters
 from nmpc_control.scenario import load_scenario
-from uav_sim.closed_loop.bench import scaling, startup
+from uav_sim.closed_loop.bench import integrators, scaling, startup
 from uav_sim.closed_loop.bench.agreement import draw, study, summary
 from uav_sim.closed_loop.bench.comparison import compare
 from uav_sim.closed_loop.bench.effort import Effort
@@ -96,6 +96,17 @@ def presets(effort: Effort, seed: int, bar: Progress) -> Result:
     }
 
 
+def integration(effort: Effort, seed: int, bar: Progress) -> Result:
+    """Accuracy and speed by integrator and sampling time."""
+    rows = _tracked(
+        bar,
+        "integrators",
+        effort.steps,
+        lambda dt: integrators.study((dt,), effort.scaling_problems, effort.repeats),
+    )
+    return {"integrators": [row for group in rows.values() for row in group]}
+
+
 def start(effort: Effort, seed: int, bar: Progress) -> Result:
     """First and later start of a process, and its memory."""
     return {"start": startup.measure()}
@@ -138,6 +149,7 @@ SECTIONS: Dict[str, Callable[[Effort, int, Progress], Result]] = {
     "closed_loop": closed_loop,
     "horizon": horizon,
     "presets": presets,
+    "integrators": integration,
     "start": start,
     "agreement": agreement,
 }

@@ -17,6 +17,7 @@ def tables(results: Dict[str, Any]) -> Iterator[Table]:
         "closed_loop": _closed_loop,
         "horizon": _horizon,
         "presets": _presets,
+        "integrators": _integrators,
         "start": lambda results: _pairs(results["start"], "a process up to its first plan"),
         "agreement": lambda results: _pairs(results["agreement"], "converged against tight IPOPT"),
         "section_s": lambda results: _pairs(results["section_s"], "seconds spent"),
@@ -116,3 +117,21 @@ def _presets(results: Dict[str, Any]) -> Table:
     for row in results["presets"]:
         table.add_row(*(_text(row[c]) for c in columns))
     return table
+
+
+def _integrators(results: Dict[str, Any]) -> Table:
+    table = _table(
+        "integrators with the paper's lags: worst error relative to the change; horizon of 6 s",
+        *("dt s", "integrator", "step error", "after 1 s", "factor"),
+        *("step us", "solve ms", "per s"),
+    )
+    keys = ("step_error", "second_error", "lag_factor", "step_us", "solve_ms", "solve_rate_hz")
+    for row in results["integrators"]:
+        figures = [f"{row[key]:.2g}" for key in keys[:3]]
+        times = ["-" if row[key] is None else _rounded(row[key]) for key in keys[3:]]
+        table.add_row(f"{row['dt']:g}", row["integrator"], *figures, *times)
+    return table
+
+
+def _rounded(value: float) -> str:
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
