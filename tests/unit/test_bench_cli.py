@@ -1,6 +1,7 @@
 """The bench as a program: what it writes, what it refuses."""
 
 import json
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from nmpc_control.model import INTEGRATORS, reference_step, step_function
 from nmpc_control.params import load_vehicle
-from uav_sim.closed_loop.bench import cli
+from uav_sim.closed_loop.bench import cli, node_memory
 from uav_sim.closed_loop.bench.agreement import Comparison, summary
 from uav_sim.closed_loop.bench.effort import QUICK
 from uav_sim.closed_loop.bench.integrators import errors
@@ -91,6 +92,19 @@ def test_integrators_are_told_apart_by_their_errors():
     assert coarse[0] > 1.0
     assert coarse[1] > 10.0, "an Euler step of 0.1 s is unstable for the paper's lags"
     assert errors(exact, exact, vehicle, 0.1) == (0.0, 0.0)
+
+
+def test_resident_memory_is_what_a_process_holds():
+    before = node_memory.resident_memory(os.getpid())
+    held = np.ones(int(40e6 / 8))
+    assert node_memory.resident_memory(os.getpid()) - before == pytest.approx(
+        held.nbytes / 2**20, rel=0.2
+    )
+
+
+def test_without_ros_no_node_is_measured(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert node_memory.measure("dji_hil") == {}
 
 
 def comparison(gap, input_gap, reached):

@@ -9,7 +9,7 @@ from rich.progress import Progress
 
 from nmpc_control.params import load_parameters
 from nmpc_control.scenario import load_scenario
-from uav_sim.closed_loop.bench import integrators, scaling, startup
+from uav_sim.closed_loop.bench import integrators, node_memory, scaling, startup
 from uav_sim.closed_loop.bench.agreement import draw, study, summary
 from uav_sim.closed_loop.bench.comparison import compare
 from uav_sim.closed_loop.bench.effort import Effort
@@ -108,8 +108,8 @@ def integration(effort: Effort, seed: int, bar: Progress) -> Result:
 
 
 def start(effort: Effort, seed: int, bar: Progress) -> Result:
-    """First and later start of a process, and its memory."""
-    return {"start": startup.measure()}
+    """First and later start of a process, its memory, and that of the real nodes."""
+    return {"startup": {**startup.measure(), **node_memory.measure(PLANT)}}
 
 
 def agreement(effort: Effort, seed: int, bar: Progress) -> Result:

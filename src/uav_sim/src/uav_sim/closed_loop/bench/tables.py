@@ -18,7 +18,7 @@ def tables(results: Dict[str, Any]) -> Iterator[Table]:
         "horizon": _horizon,
         "presets": _presets,
         "integrators": _integrators,
-        "start": lambda results: _pairs(results["start"], "a process up to its first plan"),
+        "startup": lambda results: _pairs(results["startup"], "a process up to its first plan"),
         "agreement": lambda results: _pairs(results["agreement"], "converged against tight IPOPT"),
         "section_s": lambda results: _pairs(results["section_s"], "seconds spent"),
     }
