@@ -13,7 +13,6 @@ from uav_sim.closed_loop.bench import cli, node_memory
 from uav_sim.closed_loop.bench.agreement import Comparison, summary
 from uav_sim.closed_loop.bench.effort import QUICK
 from uav_sim.closed_loop.bench.integrators import errors
-from uav_sim.closed_loop.bench.laps import PRESETS, lap
 from uav_sim.closed_loop.bench.native import native_time, traced_calls
 from uav_sim.closed_loop.bench.objective import relative_gap
 from uav_sim.closed_loop.bench.random_problems import random_problems
@@ -124,11 +123,3 @@ def test_summary_counts_worse_ones_and_other_inputs():
     assert figures["better_percent"] == 25.0
     assert figures["same_input_percent"] == 50.0, "only those without an obstacle in reach count"
     assert figures["without_obstacle"] == 2
-
-
-def test_position_priority_keeps_the_corners_and_velocity_priority_rounds_them():
-    keeping, rounding = (lap(*preset) for preset in PRESETS)
-    assert keeping.corner_distance < 0.2
-    assert keeping.roundness < 0.90  # a hexagon has 0.87
-    assert rounding.corner_distance > 0.6
-    assert rounding.roundness > 0.93  # a circle has 1
