@@ -19,7 +19,7 @@ from nmpc_control.ocp import (
     next_state,
     stage_cost,
 )
-from nmpc_control.solution import Guess, Solution, cold_guess, worst_violation
+from nmpc_control.solution import Guess, Solution, cold_guess, no_solution, worst_violation
 from nmpc_control.state import NU, NX
 
 _FEASIBLE = 1e-3  # [state or input unit] violation of hard constraints that can be flown
@@ -71,10 +71,13 @@ class IpoptSolver:
         }
 
     def solve(self, instance: Instance, guess: Optional[Guess] = None) -> Solution:
-        """Return the solution from a guess, or from hover where there is none."""
+        """Return the solution from a guess, or from hover where there is none or it is useless."""
         start = time.perf_counter()
         N = self.structure.horizon
-        guess = guess or cold_guess(instance.x0, N)
+        if not np.all(np.isfinite(np.concatenate([instance.x0, instance.u_before]))):
+            return no_solution(instance.x0, N, "failed")
+        if guess is None or not np.all(np.isfinite(np.hstack([guess.states[:-1], guess.inputs]))):
+            guess = cold_guess(instance.x0, N)
         hard = bool(instance.theta[PARTS["hard_obstacles"]][0])
         kinds = slack_kinds(self.structure, hard)
         free_states, slacks = N * NX + NX, N * (NX + NU) + NX
@@ -102,6 +105,8 @@ class IpoptSolver:
         )
         stats = solver.stats()
         z = np.asarray(result["x"]).ravel()
+        if not np.all(np.isfinite(z)) or "iterations" not in stats:
+            return no_solution(instance.x0, N, str(stats["return_status"]))
         inputs = z[free_states:slacks].reshape(N, NU)
         multipliers = np.asarray(result["lam_x"]).ravel()[free_states:slacks]
         g = np.asarray(result["g"]).ravel()
@@ -110,7 +115,7 @@ class IpoptSolver:
         violation, softened = worst_violation(z[slacks:].reshape(N + 1, -1), kinds, _SHOWN)
         status = str(stats["return_status"])
         return Solution(
-            found=bool(np.all(np.isfinite(z)) and max(defect, too_fast) < _FEASIBLE),
+            found=bool(max(defect, too_fast) < _FEASIBLE),
             status="converged" if stats["success"] else status,
             states=z[:free_states].reshape(N + 1, NX),
             inputs=np.clip(inputs, instance.input_min, instance.input_max),
