@@ -15,7 +15,8 @@ def tables(results: Dict[str, Any]) -> Iterator[Table]:
         "scaling_n": lambda results: _scaling(results, "scaling_n", "stages N"),
         "scaling_obstacles": lambda results: _scaling(results, "scaling_obstacles", "obstacles"),
         "closed_loop": _closed_loop,
-        "horizon": _horizon,
+        "horizon": lambda results: _horizon(results, "horizon", "multi_obstacle at 2.35 m/s"),
+        "horizon_circuit": lambda results: _horizon(results, "horizon_circuit", "circuit at 4 m/s"),
         "presets": _presets,
         "integrators": _integrators,
         "startup": lambda results: _pairs(results["startup"], "a process up to its first plan"),
@@ -103,10 +104,11 @@ def _closed_loop(results: Dict[str, Any]) -> Table:
     return table
 
 
-def _horizon(results: Dict[str, Any]) -> Table:
-    columns = ("seconds", "cost", "deviation_mean", "deviation_max", "clearance", "iterations_mean")
-    table = _table("multi_obstacle at 2.35 m/s against the length of the horizon", *columns)
-    for row in results["horizon"]:
+def _horizon(results: Dict[str, Any], key: str, title: str) -> Table:
+    columns = ("seconds", "cost", "deviation_mean", "deviation_max", "clearance")
+    columns += ("iterations_mean", "plans_rejected")
+    table = _table(f"{title}, against the length of the horizon", *columns)
+    for row in results[key]:
         table.add_row(*("-" if row[c] is None else f"{row[c]:.3g}" for c in columns))
     return table
 
