@@ -111,6 +111,16 @@ def test_both_backends_fly_the_same_way():
     )
 
 
+def test_the_guard_flies_plans_of_the_papers_integrator():
+    """With the paper's lags Euler steps depart from the guard's model far beyond its tolerances."""
+    scenario = load_scenario("step_xyz")
+    parameters = load_parameters("paper", scenario.weights)
+    solver = dataclasses.replace(parameters.solver, integrator="euler")
+    metrics = simulate(scenario, dataclasses.replace(parameters, solver=solver), "paper")
+    assert metrics["arrived"]
+    assert metrics["plans_rejected"] == 0
+
+
 def test_two_flights_are_the_same():
     scenario = load_scenario("step_z")
     parameters = load_parameters("dji_hil", scenario.weights)

@@ -1,15 +1,18 @@
 """The bench as a program: what it writes, what it refuses."""
 
 import json
+import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from uav_sim.closed_loop.bench import cli
+from nmpc_control.model import INTEGRATORS, reference_step, step_function
+from nmpc_control.params import load_vehicle
+from uav_sim.closed_loop.bench import cli, node_memory
 from uav_sim.closed_loop.bench.agreement import Comparison, summary
 from uav_sim.closed_loop.bench.effort import QUICK
-from uav_sim.closed_loop.bench.laps import PRESETS, lap
+from uav_sim.closed_loop.bench.integrators import errors
 from uav_sim.closed_loop.bench.native import native_time, traced_calls
 from uav_sim.closed_loop.bench.objective import relative_gap
 from uav_sim.closed_loop.bench.random_problems import random_problems
@@ -80,6 +83,29 @@ def test_gap_is_relative_to_the_best_cost():
     assert relative_gap(2e-6, 1e-6) == pytest.approx(1e-3), "costs near zero are rounding"
 
 
+def test_integrators_are_told_apart_by_their_errors():
+    vehicle, exact = load_vehicle("paper"), reference_step(0.1)
+    fine, coarse = (errors(step_function(0.1, i), exact, vehicle, 0.1) for i in INTEGRATORS[::2])
+    assert fine[0] < 0.01
+    assert fine[1] < 0.001
+    assert coarse[0] > 1.0
+    assert coarse[1] > 10.0, "an Euler step of 0.1 s is unstable for the paper's lags"
+    assert errors(exact, exact, vehicle, 0.1) == (0.0, 0.0)
+
+
+def test_resident_memory_is_what_a_process_holds():
+    before = node_memory.resident_memory(os.getpid())
+    held = np.ones(int(40e6 / 8))
+    assert node_memory.resident_memory(os.getpid()) - before == pytest.approx(
+        held.nbytes / 2**20, rel=0.2
+    )
+
+
+def test_without_ros_no_node_is_measured(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert node_memory.measure("dji_hil") == {}
+
+
 def comparison(gap, input_gap, reached):
     return Comparison("k", 0, 1.0, gap, input_gap, reached, 1, "converged", 3, 0.0, "converged", 9)
 
@@ -97,11 +123,3 @@ def test_summary_counts_worse_ones_and_other_inputs():
     assert figures["better_percent"] == 25.0
     assert figures["same_input_percent"] == 50.0, "only those without an obstacle in reach count"
     assert figures["without_obstacle"] == 2
-
-
-def test_position_priority_keeps_the_corners_and_velocity_priority_rounds_them():
-    keeping, rounding = (lap(*preset) for preset in PRESETS)
-    assert keeping.corner_distance < 0.2
-    assert keeping.roundness < 0.90  # a hexagon has 0.87
-    assert rounding.corner_distance > 0.6
-    assert rounding.roundness > 0.93  # a circle has 1

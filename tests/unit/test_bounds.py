@@ -1,13 +1,16 @@
 """Softened bounds hold where they can, and the way back is found where they cannot."""
 
+import ctypes
 import dataclasses
 
 import numpy as np
 import pytest
 from problems import SPHERE, straight_reference, tight
 
-from nmpc_control.errors import ProblemError
+from nmpc_control.errors import ConfigError, ProblemError
+from nmpc_control.ipopt import IpoptSolver, slack_kinds, transcribe
 from nmpc_control.nmpc import Nmpc
+from nmpc_control.ocp import Structure
 from nmpc_control.state import hover_input, hover_state
 
 EXCESS = 2e-3  # [m], [m/s]
@@ -137,3 +140,42 @@ def test_where_a_bound_cannot_hold_both_solve_the_same_l1_problem(soft_weight):
     ours, theirs = solutions
     assert ours.cost == pytest.approx(theirs.cost, rel=2e-3)
     assert ours.states[20, 1] == pytest.approx(theirs.states[20, 1], abs=0.05)
+
+
+def test_outside_opposite_faces_of_two_axes_the_penalty_is_the_sum_over_both():
+    """The faces of an axis share a slack variable in IPOPT; the reported cost is still L1."""
+    x0 = hover_state(np.array([0.0, 3.0, 2.0]))
+    fence = {
+        "fence_min": np.array([-1000.0, -1000.0, 2.5]),
+        "fence_max": np.array([1000.0, 1.0, 1000.0]),
+        "soft_weight": 40.0,
+    }
+    optimiser = tight("ipopt")
+    plan, solution = solve(optimiser, x0, **fence)
+    p = plan.states[:, :3]
+    excess = np.maximum(p - fence["fence_max"], 0) + np.maximum(fence["fence_min"] - p, 0)
+    assert np.all(excess[0] == pytest.approx([0.0, 2.0, 0.5]))
+    assert solution.violation == pytest.approx(2.0, abs=1e-3)
+    assert plan.cost > fence["soft_weight"] * excess.sum()
+    ours = tight("compiled")
+    ours.solver.tolerance = 1e-5
+    assert plan.cost == pytest.approx(solve(ours, x0, **fence)[0].cost, rel=2e-3)
+
+
+def test_ipopt_has_as_few_slacks_as_the_penalty_needs():
+    structure = Structure(3, 0.1, "exact_lag", 8)
+    for hard, per_stage in ((False, 4), (True, 12)):
+        assert len(slack_kinds(structure, hard)) == per_stage
+        unknowns = transcribe(structure, hard)["x"].numel()
+        assert unknowns == 4 * 10 + 3 * 4 + 4 * per_stage
+
+
+def test_a_linear_solver_that_is_not_installed_is_named():
+    structure = Structure(2, 0.1, "exact_lag", 0)
+    try:
+        ctypes.CDLL("libhsl.so")
+    except OSError:
+        with pytest.raises(ConfigError, match="solver.linear_solver: got 'ma57'"):
+            IpoptSolver(structure, 1e-6, 10, 1.0, linear_solver="ma57")
+    else:
+        IpoptSolver(structure, 1e-6, 10, 1.0, linear_solver="ma57")

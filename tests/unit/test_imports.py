@@ -46,12 +46,16 @@ GUARD = [
         "modes",
         "params",
         "plan_check",
+        "plan_consistency",
         "prediction",
         "rotations",
         "state",
     )
 ]
-SAFETY = {f"nmpc_control.{n}" for n in ("dji", "estimator", "guard", "modes", "plan_check")}
+SAFETY = {
+    f"nmpc_control.{n}"
+    for n in ("dji", "estimator", "guard", "modes", "plan_check", "plan_consistency")
+}
 SOLVER = {f"nmpc_control.{n}" for n in ("ipopt", "model", "nmpc", "ocp", "riccati", "sqp")}
 MATHEMATICS = {f"nmpc_control.{n}" for n in ("model", "nmpc", "ocp", "riccati")}
 CLOCKS = {"time.perf_counter", "time.monotonic"}

@@ -7,9 +7,14 @@ import math
 import numpy as np
 import pytest
 from flight_stub import LIMITS, PARAMS, VEHICLE, make_plan
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from nmpc_control import prediction
+from nmpc_control.model import model_parameters, step_function
 from nmpc_control.params import load_vehicle
 from nmpc_control.plan_check import Finding, check_flown, check_plan
+from nmpc_control.plan_consistency import euler_step, rk4_step
 from nmpc_control.state import GRAVITY, Obstacle, hover_input, hover_state
 
 START = hover_state(np.array([1.0, 2.0, 3.0]))
@@ -341,3 +346,67 @@ def test_outside_the_fence_only_a_plan_that_does_not_go_farther_is_flown():
     assert check(rising, state=outside).ok
     sinking = make_plan(outside, 10.0, [GRAVITY - 0.5, 0.0, 0.0, 0.0])
     assert check(sinking, state=outside).finding is Finding.ENVELOPE
+
+
+def rolled_out(step, inputs, state=START):
+    """Return the plan of an integrator: what a solver that uses it would offer."""
+    plan = make_plan(state, 10.0)
+    states = [tuple(state)]
+    for u in inputs:
+        states.append(step(states[-1], u, plan.dt, VEHICLE))
+    return dataclasses.replace(plan, states=np.array(states), inputs=np.array(inputs))
+
+
+@pytest.fixture
+def strong_inputs():
+    """Inputs for which a coarse integrator departs from the model by more than is tolerated."""
+    inputs = np.tile(hover_input(), (make_plan(START, 10.0).horizon, 1))
+    inputs[0:2, 1], inputs[2:4, 1] = 0.4, -0.4
+    return inputs
+
+
+@pytest.mark.parametrize("step", [rk4_step, euler_step])
+def test_a_plan_of_a_coarse_integrator_is_consistent_and_judged_by_where_it_leads(
+    step, strong_inputs
+):
+    plan = rolled_out(step, strong_inputs)
+    verdict = check(plan)
+    assert verdict.ok, verdict.sentence
+    exact = rolled_out(prediction.step, strong_inputs)
+    if step is euler_step:
+        assert np.abs(plan.states - exact.states).max() > CHECK.attitude_residual
+    on_the_way = sphere(exact.states[-1, :3] + [0.0, -0.6, 0.0], radius=0.3)
+    assert check(plan, obstacles=(on_the_way,)).finding is Finding.COLLISION
+
+
+@pytest.mark.parametrize("step", [rk4_step, euler_step])
+@pytest.mark.parametrize(("i", "size"), [(0, 0.06), (3, 0.06), (7, 0.35), (9, 0.12)])
+def test_a_plan_of_a_coarse_integrator_with_a_wrong_state_is_refused(step, i, size, strong_inputs):
+    plan = rolled_out(step, strong_inputs)
+    exact = prediction.step(plan.states[4], plan.inputs[4], plan.dt, VEHICLE)
+    off = math.copysign(size, plan.states[5, i] - exact[i])  # farther from the model, not nearer
+    assert (
+        check(altered(plan, states={(5, i): plan.states[5, i] + off})).finding is Finding.DYNAMICS
+    )
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**31))
+def test_random_departures_are_not_explained_by_a_coarse_integrator(seed):
+    """Noise beyond the tolerances in a plan of the model: no integrator makes it consistent."""
+    rng = np.random.default_rng(seed)
+    plan = make_plan(START, 10.0)
+    k, i = rng.integers(1, plan.horizon), rng.choice([0, 1, 2, 3, 4, 6, 7, 8, 9])
+    size = 1.1 * {3: 0.05, 4: 0.05, 6: 0.3, 7: 0.3, 8: 0.3, 9: 0.1}.get(int(i), 0.05)
+    broken = altered(plan, states={(k, i): plan.states[k, i] + rng.choice([-1, 1]) * size})
+    assert check(broken).finding is Finding.DYNAMICS
+
+
+@pytest.mark.parametrize("name", ["dji_hil", "eth", "paper"])
+def test_coarse_steps_are_those_of_the_controller(name):
+    vehicle, rng = load_vehicle(name), np.random.default_rng(0)
+    x = rng.normal(0.0, [3, 3, 3, 0.2, 0.2, 1.5, 2, 2, 1, 0.5])
+    u = rng.uniform([5, -0.4, -0.4, -1], [15, 0.4, 0.4, 1])
+    for integrator, step in (("rk4", rk4_step), ("euler", euler_step)):
+        theirs = step_function(0.1, integrator)(x, u, model_parameters(vehicle))
+        assert np.ravel(theirs.full()) == pytest.approx(step(x, u, 0.1, vehicle), abs=1e-12)

@@ -10,11 +10,13 @@ from typing import Deque, Optional, Sequence, Tuple
 
 import numpy as np
 
+from nmpc_control.errors import ProblemError
 from nmpc_control.estimator import Estimator, StateEstimate
 from nmpc_control.itinerary import Itinerary
 from nmpc_control.nmpc import Nmpc
 from nmpc_control.params import Parameters
 from nmpc_control.prediction import predict
+from nmpc_control.solution import no_solution
 from nmpc_control.state import POSITION, VELOCITY, YAW, Goal, Obstacle, Plan, hover_input
 
 _INPUT_MEMORY = 2.0  # [s] inputs older than this cannot matter for the delay
@@ -81,7 +83,7 @@ class Controller:
         x0 = predict(x, t, t + self.parameters.vehicle.delay, self._inputs, self.parameters.vehicle)
         times = self.nmpc.stage_times(t)
         references = self.itinerary.reference(times)
-        plan = self.nmpc.solve(t, x0, references, self._input_before(t), self.obstacles)
+        plan = self._solve(t, x0, references)
         return Step(
             estimate=estimate,
             reference=self.itinerary.reference(np.array([t]))[0],
@@ -91,6 +93,30 @@ class Controller:
             reference_time=self.itinerary.reference_time(times[0]),
             clearance=self._clearance(x[None, POSITION], np.array([t])),
             predicted_clearance=self._clearance(plan.states[:, POSITION], times),
+        )
+
+    def _solve(self, t: float, x0: np.ndarray, references: np.ndarray) -> Plan:
+        """Return the plan; one that is not found where the problem cannot be posed at all.
+
+        A control tick raises nothing: an obstacle that is nowhere is a reason, not an exception.
+        """
+        try:
+            return self.nmpc.solve(t, x0, references, self._input_before(t), self.obstacles)
+        except ProblemError as error:
+            self.nmpc.reset()
+            nothing = no_solution(x0, self.nmpc.structure.horizon, str(error))
+        return Plan(
+            t=t,
+            dt=self.nmpc.structure.dt,
+            delay=self.parameters.vehicle.delay,
+            states=nothing.states,
+            inputs=nothing.inputs,
+            found=nothing.found,
+            status=nothing.status,
+            iterations=nothing.iterations,
+            solve_time=nothing.solve_time,
+            cost=nothing.cost,
+            kkt_residual=nothing.kkt_residual,
         )
 
     def _input_before(self, t: float) -> np.ndarray:

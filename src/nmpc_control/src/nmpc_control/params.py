@@ -12,6 +12,8 @@ import numpy as np
 
 from nmpc_control.config import config_directory, from_dict, load_yaml
 
+LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97")  # all but the first are HSL
+
 
 def _array(length: int, minimum: float = -1e9) -> np.ndarray:
     return field(metadata={"length": length, "min": minimum})
@@ -148,6 +150,7 @@ class Solver:
     horizon: int = field(metadata={"min": 2, "max": 1000})  # N, number of stages
     dt: float = _positive()  # [s]
     obstacle_slots: int = field(metadata={"min": 0, "max": 256})
+    linear_solver: str = field(metadata={"choices": LINEAR_SOLVERS})  # of ipopt
     compiled: Budget
     ipopt: Budget
 

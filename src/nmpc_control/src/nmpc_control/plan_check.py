@@ -9,10 +9,10 @@ from typing import Optional, Sequence, Tuple
 import numpy as np
 
 from nmpc_control.params import Limits, Vehicle
-from nmpc_control.prediction import predict, step
+from nmpc_control.plan_consistency import as_flown, departure
+from nmpc_control.prediction import predict
 from nmpc_control.rotations import wrap_angle
 from nmpc_control.state import (
-    ATTITUDE,
     NU,
     NX,
     PITCH,
@@ -124,33 +124,6 @@ def check_plan(
     flown = as_flown(plan, t, state, inputs, vehicle)
     refusal = _check_envelope(flown, t, state, limits, params)
     return refusal or replace(check_clearance(flown, t, vehicle, obstacles, params), flown=flown)
-
-
-def as_flown(
-    plan: Plan,
-    t: float,
-    state: np.ndarray,
-    inputs: Sequence[Tuple[float, Sequence[float]]],
-    vehicle: Vehicle,
-) -> Plan:
-    """Return the plan with the states to which its inputs take the aircraft from where it is.
-
-    A plan that is consistent in itself may begin beside the aircraft; what counts is where its
-    inputs lead.
-    """
-    states = plan.states.copy()
-    first = max(0, math.ceil((t - plan.t - plan.delay) / plan.dt))
-    if first > plan.horizon:
-        return plan
-    sent = [(plan.t + k * plan.dt, u) for k, u in enumerate(plan.inputs[: first + 1])]
-    history = [*inputs, *((max(when, t), u) for when, u in sent)]
-    begin = plan.t + plan.delay + first * plan.dt
-    x = predict(state, t, begin, history, vehicle)
-    states[first] = x
-    for k in range(first, plan.horizon):
-        x = step(x, plan.inputs[k], plan.dt, vehicle)
-        states[k + 1] = x
-    return replace(plan, states=states)
 
 
 def check_flown(
@@ -274,21 +247,14 @@ def _check_bounds(plan: Plan, limits: Limits, params: PlanCheckParameters) -> Op
 
 
 def _check_dynamics(plan: Plan, vehicle: Vehicle, params: PlanCheckParameters) -> Optional[Verdict]:
-    states, inputs = plan.states.tolist(), plan.inputs.tolist()
-    model = np.array([step(x, u, plan.dt, vehicle) for x, u in zip(states, inputs)])
-    residual = np.abs(plan.states[1:] - model)
-    for name, part, tolerance, unit in (
-        ("position", POSITION, params.position_residual, "m"),
-        ("attitude", ATTITUDE, params.attitude_residual, "rad"),
-        ("velocity", VELOCITY, params.velocity_residual, "m/s"),
-        ("yaw rate", slice(9, 10), params.yaw_rate_residual, "rad/s"),
-    ):
-        worst = residual[:, part].max(axis=1)
-        if not worst.max() <= tolerance:
-            k = int(worst.argmax())
-            sentence = f"the plan's {name} departs from the model by {worst[k]:.2g} {unit}"
-            return Verdict(Finding.DYNAMICS, f"{sentence} at stage {k}")
-    return None
+    tolerances = (
+        params.position_residual,
+        params.attitude_residual,
+        params.velocity_residual,
+        params.yaw_rate_residual,
+    )
+    worst = departure(plan, vehicle, tolerances)
+    return Verdict(Finding.DYNAMICS, str(worst)) if worst else None
 
 
 def _check_jump(

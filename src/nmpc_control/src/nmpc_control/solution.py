@@ -53,6 +53,22 @@ def cold_guess(x0: np.ndarray, horizon: int) -> Guess:
     return Guess(np.tile(x, (horizon + 1, 1)), inputs)
 
 
+def no_solution(x0: np.ndarray, horizon: int, status: str) -> Solution:
+    """Return what a solver answers when it has nothing: finite numbers that may not be flown."""
+    hover = cold_guess(np.nan_to_num(x0, nan=0.0, posinf=0.0, neginf=0.0), horizon)
+    return Solution(
+        found=False,
+        status=status,
+        states=hover.states,
+        inputs=hover.inputs,
+        cost=np.inf,
+        iterations=0,
+        kkt_residual=np.inf,
+        active_bounds=0,
+        solve_time=0.0,
+    )
+
+
 def shift(guess: Guess, stages: float) -> Guess:
     """Return the guess moved on by a (fractional) number of stages, its last stage held."""
     N = len(guess.inputs)

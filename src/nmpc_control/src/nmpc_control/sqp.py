@@ -21,7 +21,7 @@ from nmpc_control.compiled_function import Buffered, compile_functions
 from nmpc_control.ocp import PARTS, Instance, Structure
 from nmpc_control.riccati import NZ, SUMMARY, backward
 from nmpc_control.rollout import forward, settle
-from nmpc_control.solution import Guess, Solution, cold_guess, worst_violation
+from nmpc_control.solution import Guess, Solution, cold_guess, no_solution, worst_violation
 from nmpc_control.state import NU, NX, YAW
 
 _ARMIJO = 1e-4
@@ -124,11 +124,10 @@ class SqpSolver:
         a["stages"][:], a["theta"][:, 0] = instance.stages, instance.theta
         cost, model = self._begin(instance, guess)
         accuracy, excess, before = _FIRST_ACCURACY, _EXCESS * self.tolerance**0.5, np.inf
-        iterations, status, step = 0, "failed", Step(np.inf, -np.inf, np.inf, 0, False)
+        iterations, status, step = 0, "budget", Step(np.inf, -np.inf, np.inf, 0, False)
         while np.isfinite(cost):
             late = time.perf_counter() - start > self.time_budget
             if iterations >= self.max_iterations or late:
-                status = "budget"
                 break
             step = self._direction(model)
             scale = 1.0 + self._tracking
@@ -156,9 +155,11 @@ class SqpSolver:
                 if moved > max(excess, _SLOW * before):
                     cost = self._stiffen()
                 before = moved
+        if not np.isfinite(cost):
+            return no_solution(instance.x0, self.structure.horizon, "failed")
         violation, softened, objective = self._statement()
         return Solution(
-            found=bool(np.isfinite(cost)),
+            found=True,
             status=status,
             states=a["X"].T.copy(),
             inputs=a["U"].T.copy(),

@@ -22,6 +22,7 @@ class Effort:
     seconds: Tuple[float, ...]  # [s] horizons flown
     presets: Tuple[Tuple[str, float], ...]  # weight preset, mean speed [m/s]
     agreement: int  # problems
+    steps: Tuple[float, ...]  # [s] sampling times of the integrators
 
 
 FULL = Effort(
@@ -33,9 +34,10 @@ FULL = Effort(
     slots=(0, 8, 16, 32, 64, 128),
     scaling_problems=20,
     flights=("hexagon", "multi_obstacle"),
-    seconds=(1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.0),
+    seconds=(1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0),
     presets=PRESETS,
     agreement=60,
+    steps=(0.01, 0.02, 0.05, 0.1, 0.2),
 )
 QUICK = Effort(
     problems=2,
@@ -49,4 +51,5 @@ QUICK = Effort(
     seconds=(2.0, 6.0),
     presets=PRESETS[1:],
     agreement=4,
+    steps=(0.1,),
 )

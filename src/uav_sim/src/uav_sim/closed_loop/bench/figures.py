@@ -10,6 +10,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402 - the backend must be chosen before
 import numpy as np  # noqa: E402
 
+from uav_sim.closed_loop.bench.scenes import circuit  # noqa: E402
+
 _COLOURS = {
     "budgeted": "tab:green",
     "converged": "tab:olive",
@@ -17,13 +19,15 @@ _COLOURS = {
     "paper": "tab:red",
 }
 
+_SHOWN_HORIZONS = (1.0, 2.0, 6.0, 12.0)  # [s]
+
 
 def draw(results: Dict[str, Any], folder: Path) -> List[Path]:
     """Write a figure for every section that was measured; return the files."""
     makers: Dict[str, Callable[[Any], plt.Figure]] = {
         "samples_ms": _backends,
         "scaling_n": lambda _: _scaling(results),
-        "horizon": _horizon,
+        "horizon": lambda _: _horizon(results),
         "presets": _presets,
     }
     names = {"samples_ms": "backends", "scaling_n": "scaling"}
@@ -32,7 +36,7 @@ def draw(results: Dict[str, Any], folder: Path) -> List[Path]:
         if key in results:
             figure = maker(results[key])
             files.append(folder / f"bench_{names.get(key, key)}.png")
-            figure.savefig(files[-1], dpi=120)
+            figure.savefig(files[-1], dpi=100)
             plt.close(figure)
     return files
 
@@ -71,19 +75,34 @@ def _scaling(results: Dict[str, Any]) -> plt.Figure:
     return figure
 
 
-def _horizon(rows: List[Dict[str, Any]]) -> plt.Figure:
-    figure, panels = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
-    seconds = [row["seconds"] for row in rows]
-    for key, label in (("deviation_mean", "mean deviation"), ("clearance", "least clearance")):
-        panels[0].plot(seconds, [row[key] for row in rows], "o-", label=label)
-    panels[0].set(ylabel="[m]")
-    panels[0].legend()
-    panels[1].plot(seconds, [row["cost"] for row in rows], "o-", color="tab:purple")
-    panels[1].set(ylabel="closed-loop cost [1/s]")
-    for axes in panels:
-        axes.set(xlabel="horizon [s]", ylim=(0, None))
-        axes.grid(alpha=0.3)
-    figure.suptitle("multi_obstacle at 2.35 m/s: what a longer look ahead is worth")
+def _horizon(results: Dict[str, Any]) -> plt.Figure:
+    """Paths around the circuit, and what a longer look ahead is worth relative to the longest."""
+    figure, panels = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained")
+    scene, laps = circuit(), results["horizon_circuit"]
+    reference = scene.trajectory.sample(np.linspace(0.0, scene.trajectory.duration, 400)).position
+    panels[0].plot(*reference[:, :2].T, "k--", lw=1, label="reference")
+    for sphere in scene.obstacles:
+        panels[0].add_patch(plt.Circle(sphere.position[:2], sphere.size[0], color="0.8"))
+    for lap in laps:
+        if lap["seconds"] in _SHOWN_HORIZONS:
+            panels[0].plot(*np.array(lap["path"]).T, lw=1.3, label=f"{lap['seconds']:g} s")
+    panels[0].set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title="circuit at 4 m/s")
+    panels[0].legend(loc="center", title="horizon")
+    for key, name, marker in (
+        ("horizon_circuit", "circuit, 4 m/s", "o"),
+        ("horizon", "multi_obstacle, 2.35 m/s", "s"),
+    ):
+        rows = results[key]
+        seconds = [row["seconds"] for row in rows]
+        for quantity, label, line in (
+            ("cost", "closed-loop cost", "-"),
+            ("deviation_mean", "mean deviation", "--"),
+        ):
+            part = [row[quantity] / rows[-1][quantity] for row in rows]
+            panels[1].plot(seconds, part, line + marker, ms=4, label=f"{label}: {name}")
+    panels[1].set(xlabel="horizon [s]", ylabel="relative to the longest horizon")
+    panels[1].grid(alpha=0.3)
+    panels[1].legend()
     return figure
 
 
@@ -96,7 +115,7 @@ def _presets(laps: List[Dict[str, Any]]) -> plt.Figure:
         path = np.array(lap["path"])
         label = f"{lap['preset']}, {lap['speed']:g} m/s"
         axes.plot(path[:, 0], path[:, 1], label=label)
-    axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title="hexagon, second lap of three")
     axes.grid(alpha=0.3)
     axes.legend(loc="center")
     return figure

@@ -36,6 +36,7 @@ class FlightFigures:
     deviation_max: float  # [m]
     clearance: float  # [m] hull to the nearest surface; inf without obstacles
     iterations_mean: float
+    plans_rejected: int  # by the guard
 
     @classmethod
     def of(cls, flight: RecordedFlight) -> "FlightFigures":
@@ -53,6 +54,7 @@ class FlightFigures:
             deviation_max=float(np.max(deviations)),
             clearance=min(flight.loop.aircraft.clearance.values(), default=float("inf")),
             iterations_mean=float(np.mean([steps[i].plan.iterations for i in chosen])),
+            plans_rejected=flight.loop.guard.ladder.rejected,
         )
 
 
@@ -64,10 +66,9 @@ def fly_with(name: str, scenario: Scenario, until: Optional[float] = None) -> Fl
 
 def fly_with_horizon(
     seconds: float, scenario: Scenario, until: Optional[float] = None
-) -> FlightFigures:
-    """Return the figures of a scenario flown with another horizon [s], the same step."""
+) -> RecordedFlight:
+    """Return the flight of a scenario with another horizon [s], the same step."""
     parameters = load_parameters(PLANT, scenario.weights)
     horizon = round(seconds / parameters.solver.dt)
     parameters = replace(parameters, solver=replace(parameters.solver, horizon=horizon))
-    flight = record(scenario, parameters, exact_solver(structure_of(parameters)), until=until)
-    return FlightFigures.of(flight)
+    return record(scenario, parameters, exact_solver(structure_of(parameters)), until=until)

@@ -3,21 +3,27 @@
 
 import dataclasses
 import math
-from typing import Any, Callable, Dict, List
+from typing import Any, Callable, Dict, List, Tuple
 
 from rich.progress import Progress
 
 from nmpc_control.params import load_parameters
 from nmpc_control.scenario import load_scenario
-from uav_sim.closed_loop.bench import scaling, startup
+from uav_sim.closed_loop.bench import integrators, node_memory, scaling, startup
 from uav_sim.closed_loop.bench.agreement import draw, study, summary
 from uav_sim.closed_loop.bench.comparison import compare
 from uav_sim.closed_loop.bench.effort import Effort
-from uav_sim.closed_loop.bench.flights import BACKENDS, fly_with, fly_with_horizon
+from uav_sim.closed_loop.bench.flights import (
+    BACKENDS,
+    FlightFigures,
+    fly_with,
+    fly_with_horizon,
+)
 from uav_sim.closed_loop.bench.laps import lap
 from uav_sim.closed_loop.bench.paper_flight import reproduction
 from uav_sim.closed_loop.bench.problems import recorded_problems
 from uav_sim.closed_loop.bench.recording import PLANT
+from uav_sim.closed_loop.bench.scenes import circuit
 
 Result = Dict[str, Any]
 _HORIZON_SPEED = 2.35  # [m/s] the fastest at which this path was flown with the paper's code
@@ -67,15 +73,19 @@ def closed_loop(effort: Effort, seed: int, bar: Progress) -> Result:
 
 
 def horizon(effort: Effort, seed: int, bar: Progress) -> Result:
-    """Fly with horizons from short to long."""
-    scenario = load_scenario("multi_obstacle", speed=_HORIZON_SPEED)
-    figures = _tracked(
-        bar,
-        "horizons",
-        effort.seconds,
-        lambda s: _plain(fly_with_horizon(s, scenario, effort.until)),
-    )
-    return {"horizon": [{"seconds": s, **figure} for s, figure in figures.items()]}
+    """Fly with horizons from short to long: the paper's obstacles, and a faster circuit."""
+    scenes = {"horizon": load_scenario("multi_obstacle", speed=_HORIZON_SPEED)}
+    scenes["horizon_circuit"] = circuit()
+    flights = [(key, seconds) for key in scenes for seconds in effort.seconds]
+
+    def row(flight: Tuple[str, float]) -> Dict[str, Any]:
+        key, seconds = flight
+        flown = fly_with_horizon(seconds, scenes[key], effort.until)
+        path = [[round(c, 3) for c in t.position[:2]] for t in flown.log.truths[::5]]
+        return {"seconds": seconds, **_plain(FlightFigures.of(flown)), "path": path}
+
+    figures = _tracked(bar, "horizons", flights, row)
+    return {key: [figures[key, seconds] for seconds in effort.seconds] for key in scenes}
 
 
 def presets(effort: Effort, seed: int, bar: Progress) -> Result:
@@ -96,9 +106,20 @@ def presets(effort: Effort, seed: int, bar: Progress) -> Result:
     }
 
 
+def integration(effort: Effort, seed: int, bar: Progress) -> Result:
+    """Accuracy and speed by integrator and sampling time."""
+    rows = _tracked(
+        bar,
+        "integrators",
+        effort.steps,
+        lambda dt: integrators.study((dt,), effort.scaling_problems, effort.repeats),
+    )
+    return {"integrators": [row for group in rows.values() for row in group]}
+
+
 def start(effort: Effort, seed: int, bar: Progress) -> Result:
-    """First and later start of a process, and its memory."""
-    return {"start": startup.measure()}
+    """First and later start of a process, its memory, and that of the real nodes."""
+    return {"startup": {**startup.measure(), **node_memory.measure(PLANT)}}
 
 
 def agreement(effort: Effort, seed: int, bar: Progress) -> Result:
@@ -138,6 +159,7 @@ SECTIONS: Dict[str, Callable[[Effort, int, Progress], Result]] = {
     "closed_loop": closed_loop,
     "horizon": horizon,
     "presets": presets,
+    "integrators": integration,
     "start": start,
     "agreement": agreement,
 }

@@ -15,9 +15,11 @@ def tables(results: Dict[str, Any]) -> Iterator[Table]:
         "scaling_n": lambda results: _scaling(results, "scaling_n", "stages N"),
         "scaling_obstacles": lambda results: _scaling(results, "scaling_obstacles", "obstacles"),
         "closed_loop": _closed_loop,
-        "horizon": _horizon,
+        "horizon": lambda results: _horizon(results, "horizon", "multi_obstacle at 2.35 m/s"),
+        "horizon_circuit": lambda results: _horizon(results, "horizon_circuit", "circuit at 4 m/s"),
         "presets": _presets,
-        "start": lambda results: _pairs(results["start"], "a process up to its first plan"),
+        "integrators": _integrators,
+        "startup": lambda results: _pairs(results["startup"], "a process up to its first plan"),
         "agreement": lambda results: _pairs(results["agreement"], "converged against tight IPOPT"),
         "section_s": lambda results: _pairs(results["section_s"], "seconds spent"),
     }
@@ -102,10 +104,11 @@ def _closed_loop(results: Dict[str, Any]) -> Table:
     return table
 
 
-def _horizon(results: Dict[str, Any]) -> Table:
-    columns = ("seconds", "cost", "deviation_mean", "deviation_max", "clearance", "iterations_mean")
-    table = _table("multi_obstacle at 2.35 m/s against the length of the horizon", *columns)
-    for row in results["horizon"]:
+def _horizon(results: Dict[str, Any], key: str, title: str) -> Table:
+    columns = ("seconds", "cost", "deviation_mean", "deviation_max", "clearance")
+    columns += ("iterations_mean", "plans_rejected")
+    table = _table(f"{title}, against the length of the horizon", *columns)
+    for row in results[key]:
         table.add_row(*("-" if row[c] is None else f"{row[c]:.3g}" for c in columns))
     return table
 
@@ -116,3 +119,21 @@ def _presets(results: Dict[str, Any]) -> Table:
     for row in results["presets"]:
         table.add_row(*(_text(row[c]) for c in columns))
     return table
+
+
+def _integrators(results: Dict[str, Any]) -> Table:
+    table = _table(
+        "integrators with the paper's lags: worst error relative to the change; horizon of 6 s",
+        *("dt s", "integrator", "step error", "after 1 s", "factor"),
+        *("step us", "solve ms", "per s"),
+    )
+    keys = ("step_error", "second_error", "lag_factor", "step_us", "solve_ms", "solve_rate_hz")
+    for row in results["integrators"]:
+        figures = [f"{row[key]:.2g}" for key in keys[:3]]
+        times = ["-" if row[key] is None else _rounded(row[key]) for key in keys[3:]]
+        table.add_row(f"{row['dt']:g}", row["integrator"], *figures, *times)
+    return table
+
+
+def _rounded(value: float) -> str:
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"

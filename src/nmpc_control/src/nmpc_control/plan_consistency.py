@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+"""Do a plan's states follow from its inputs, by the guard's own model, and where do those lead?
+
+A plan of a solver that was told to use a coarser integrator (``rk4``, ``euler``: the paper's Eq. 6)
+departs from that model by what the integrator gets wrong, which is no fault of the plan. It is
+consistent when one of them explains every stage of it, and that far more closely than the
+tolerances of the default. It gains nothing by that: clearance, fence and speed are checked on the
+states to which its inputs really lead (``as_flown``).
+"""
+
+import math
+from dataclasses import replace
+from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from nmpc_control.params import Vehicle
+from nmpc_control.prediction import Vector, derivative, predict, step
+from nmpc_control.state import ATTITUDE, POSITION, VELOCITY, YAW_RATE, Plan
+
+EXPLAINED = 5e-3  # [m, rad, m/s, rad/s] by which a plan may depart from its own coarse integrator
+PARTS = (
+    ("position", POSITION, "m"),
+    ("attitude", ATTITUDE, "rad"),
+    ("velocity", VELOCITY, "m/s"),
+    ("yaw rate", slice(YAW_RATE, YAW_RATE + 1), "rad/s"),
+)
+Step = Callable[[Sequence[float], Sequence[float], float, Vehicle], Vector]
+
+
+class Departure(NamedTuple):
+    """The worst departure of a plan from the model in one part of the state."""
+
+    part: str
+    size: float
+    unit: str
+    stage: int
+
+    def __str__(self) -> str:
+        size = f"{self.size:.2g} {self.unit}"
+        return f"the plan's {self.part} departs from the model by {size} at stage {self.stage}"
+
+
+def departure(plan: Plan, vehicle: Vehicle, tolerances: Sequence[float]) -> Optional[Departure]:
+    """Return where a plan departs from the model by more than is tolerated, None where it does not.
+
+    Args:
+        plan: of finite numbers and fitting shapes.
+        vehicle: the guard's own model.
+        tolerances: of position [m], attitude [rad], velocity [m/s], yaw rate [rad/s] per stage.
+    """
+    worst = _departures(plan, vehicle, step)
+    beyond = [d for d, tolerance in zip(worst, tolerances) if not d.size <= tolerance]
+    if not beyond or any(_explains(coarse, plan, vehicle) for coarse in (rk4_step, euler_step)):
+        return None
+    return beyond[0]
+
+
+def as_flown(
+    plan: Plan,
+    t: float,
+    state: np.ndarray,
+    inputs: Sequence[Tuple[float, Sequence[float]]],
+    vehicle: Vehicle,
+) -> Plan:
+    """Return the plan with the states to which its inputs take the aircraft from where it is.
+
+    A plan that is consistent in itself may begin beside the aircraft; what counts is where its
+    inputs lead.
+    """
+    states = plan.states.copy()
+    first = max(0, math.ceil((t - plan.t - plan.delay) / plan.dt))
+    if first > plan.horizon:
+        return plan
+    sent = [(plan.t + k * plan.dt, u) for k, u in enumerate(plan.inputs[: first + 1])]
+    history = [*inputs, *((max(when, t), u) for when, u in sent)]
+    begin = plan.t + plan.delay + first * plan.dt
+    x = predict(state, t, begin, history, vehicle)
+    states[first] = x
+    for k in range(first, plan.horizon):
+        x = step(x, plan.inputs[k], plan.dt, vehicle)
+        states[k + 1] = x
+    return replace(plan, states=states)
+
+
+def euler_step(state: Sequence[float], u: Sequence[float], dt: float, vehicle: Vehicle) -> Vector:
+    """Return the state (10,) after one explicit Euler step of ``dt`` [s] (paper, Eq. 6)."""
+    return _along(state, derivative(state, u, vehicle), dt)
+
+
+def rk4_step(state: Sequence[float], u: Sequence[float], dt: float, vehicle: Vehicle) -> Vector:
+    """Return the state (10,) after one classical Runge-Kutta step of ``dt`` [s]."""
+    k1 = derivative(state, u, vehicle)
+    k2 = derivative(_along(state, k1, dt / 2.0), u, vehicle)
+    k3 = derivative(_along(state, k2, dt / 2.0), u, vehicle)
+    k4 = derivative(_along(state, k3, dt), u, vehicle)
+    mean = [(a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4)]
+    return _along(state, mean, dt)
+
+
+def _along(state: Sequence[float], slope: Sequence[float], t: float) -> Vector:
+    return tuple(x + t * k for x, k in zip(state, slope))
+
+
+def _explains(coarse: Step, plan: Plan, vehicle: Vehicle) -> bool:
+    return all(d.size <= EXPLAINED for d in _departures(plan, vehicle, coarse))
+
+
+def _departures(plan: Plan, vehicle: Vehicle, model: Step) -> Tuple[Departure, ...]:
+    states, inputs = plan.states.tolist(), plan.inputs.tolist()
+    expected = np.array([model(x, u, plan.dt, vehicle) for x, u in zip(states, inputs)])
+    residual = np.abs(plan.states[1:] - expected)
+    worst: List[Departure] = []
+    for name, part, unit in PARTS:
+        by_stage = residual[:, part].max(axis=1)
+        k = int(by_stage.argmax())
+        worst.append(Departure(name, float(by_stage[k]), unit, k))
+    return tuple(worst)
