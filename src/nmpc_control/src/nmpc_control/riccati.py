@@ -16,6 +16,7 @@ import numpy as np
 
 from nmpc_control import augmented, obstacle_terms
 from nmpc_control.ocp import THETA_SIZE, Structure, Symbols, input_bounds, next_state
+from nmpc_control.parametric import StageFunction, stage_function
 from nmpc_control.small_matrices import (
     cholesky,
     forward_substitution,
@@ -42,7 +43,7 @@ def backward(structure: Structure, exact: bool) -> ca.Function:
     positive: the least pivot says whether its step may be used.
     """
     N = structure.horizon
-    last, inner = _terminal_model(structure, exact), _stage_backward(structure, exact)
+    last, (prepare, inner) = _terminal_model(structure, exact), _stage_backward(structure, exact)
     X, U = ca.MX.sym("X", NX, N + 1), ca.MX.sym("U", NU, N)
     u_before, stages = ca.MX.sym("u_before", NU), ca.MX.sym("stages", structure.stage_size, N + 1)
     theta = ca.MX.sym("theta", THETA_SIZE)
@@ -55,15 +56,16 @@ def backward(structure: Structure, exact: bool) -> ca.Function:
         all_stages = obstacle_terms.derivatives(structure, exact).map(N + 1)
         obstacles = all_stages(X, stages, ca.repmat(theta, 1, N + 1), multipliers)
         gradients, hessians = (ca.horzsplit(part) for part in obstacles)
+    shared = prepare(theta)
     P, s, adjoint, along = last(xs[N], data[N], theta, forces[N], gradients[N], hessians[N])
     gains: List[ca.MX] = [None] * N
     step: List[ca.MX] = [None] * N
     summary = ca.MX([0.0, 0.0, 0.0, 0.0, np.inf, 0.0])
     for k in reversed(range(N)):
         before = us[k - 1] if k else u_before
-        here = [xs[k], us[k], before, data[k], theta, forces[k], gradients[k], hessians[k]]
+        here = [xs[k], us[k], before, data[k], forces[k], gradients[k], hessians[k]]
         gains[k], step[k], P, s, adjoint, along, summary = inner(
-            *here, damping, clamping, P, s, adjoint, along, summary
+            *here, damping, clamping, P, s, adjoint, along, summary, shared
         )
     return ca.Function(
         "backward_exact" if exact else "backward",
@@ -90,7 +92,7 @@ def _terminal_model(structure: Structure, exact: bool) -> ca.Function:
     )
 
 
-def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
+def _stage_backward(structure: Structure, exact: bool) -> StageFunction:
     s = Symbols(structure)
     obstacle_gradient, obstacle_hessian = ca.SX.sym("g", 3), ca.SX.sym("H", 6)
     damping, clamping = ca.SX.sym("damping"), ca.SX.sym("clamping")
@@ -155,11 +157,12 @@ def _stage_backward(structure: Structure, exact: bool) -> ca.Function:
         ca.fmin(summary[4], ca.mmin(ca.vertcat(*pivots, *tried_pivots))),
         summary[5] + ca.sum1(ca.fabs(ca.logic_or(on_low, on_high) - (1 - free))),
     )
-    return ca.Function(
+    return stage_function(
         "stage_backward",
-        [s.x, s.u, s.u_before, s.stage, s.theta, s.multipliers, obstacle_gradient]
-        + [obstacle_hessian, damping, clamping, P_half, value_gradient, adjoint, along, summary],
-        [ca.densify(gains), step, pack_symmetric(P_before)]
+        [s.x, s.u, s.u_before, s.stage, s.multipliers, obstacle_gradient, obstacle_hessian]
+        + [damping, clamping, P_half, value_gradient, adjoint, along, summary],
+        s.theta,
+        [gains, step, pack_symmetric(P_before)]
         + [s_before, adjoint_before, along_before, new_summary],
     )
 

@@ -8,6 +8,7 @@ import casadi as ca
 
 from nmpc_control import augmented, obstacle_terms
 from nmpc_control.ocp import THETA_SIZE, Structure, Symbols, input_bounds, next_state
+from nmpc_control.parametric import StageFunction, stage_function
 from nmpc_control.riccati import NZ
 from nmpc_control.state import NU, NX
 
@@ -20,7 +21,7 @@ def forward(structure: Structure) -> ca.Function:
     the augmented Lagrangian.
     """
     N = structure.horizon
-    inner = _stage_forward(structure)
+    prepare, inner = _stage_forward(structure)
     x0, u_before, alpha = ca.MX.sym("x0", NX), ca.MX.sym("u_before", NU), ca.MX.sym("alpha")
     X, U = ca.MX.sym("X", NX, N + 1), ca.MX.sym("U", NU, N)
     gains, step = ca.MX.sym("gains", NU, NZ * N), ca.MX.sym("step", NU, N)
@@ -35,10 +36,10 @@ def forward(structure: Structure) -> ca.Function:
         ca.horzsplit(step),
     )
     x, before, nominal, cost = x0, u_before, u_before, ca.MX.zeros(2)
-    states, inputs = [x0], []
+    states, inputs, shared = [x0], [], prepare(theta)
     for k in range(N):
         law = [xs[k], us[k], nominal, laws[k], steps[k], alpha]
-        x, u, cost = inner(x, before, *law, data[k], theta, forces[k], cost)
+        x, u, cost = inner(x, before, *law, data[k], forces[k], cost, shared)
         before, nominal = u, us[k]
         states.append(x)
         inputs.append(u)
@@ -89,7 +90,7 @@ def settle(structure: Structure) -> ca.Function:
     )
 
 
-def _stage_forward(structure: Structure) -> ca.Function:
+def _stage_forward(structure: Structure) -> StageFunction:
     s = Symbols(structure)
     x_bar, u_bar, before_bar = (
         ca.SX.sym("x_bar", NX),
@@ -104,9 +105,10 @@ def _stage_forward(structure: Structure) -> ca.Function:
     u = ca.fmin(ca.fmax(law, low), high)
     outputs = [next_state(structure, s), total + augmented.stage_cost(s, terminal=False)]
     x_next, cost = ca.substitute(outputs, [s.u], [u])
-    return ca.Function(
+    return stage_function(
         "stage_forward",
         [s.x, s.u_before, x_bar, u_bar, before_bar, K, step, alpha]
-        + [s.stage, s.theta, s.multipliers, total],
+        + [s.stage, s.multipliers, total],
+        s.theta,
         [x_next, u, cost],
     )
