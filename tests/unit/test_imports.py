@@ -56,8 +56,12 @@ SAFETY = {
     f"nmpc_control.{n}"
     for n in ("dji", "estimator", "guard", "modes", "plan_check", "plan_consistency")
 }
-SOLVER = {f"nmpc_control.{n}" for n in ("ipopt", "model", "nmpc", "ocp", "riccati", "sqp")}
-MATHEMATICS = {f"nmpc_control.{n}" for n in ("model", "nmpc", "ocp", "riccati")}
+MATHEMATICS = {
+    f"nmpc_control.{n}"
+    for n in ("augmented", "constraints", "model", "newton_step", "nmpc", "obstacle_terms", "ocp")
+    + ("packing", "parametric", "riccati", "rollout", "slots", "small_matrices")
+}
+SOLVER = MATHEMATICS | {f"nmpc_control.{n}" for n in ("ipopt", "sqp")}
 CLOCKS = {"time.perf_counter", "time.monotonic"}
 SURROUNDINGS = {"datetime.datetime.now", "datetime.now", "os.environ", "os.getenv", "time.time"}
 TIMES_A_SOLVE = {f"nmpc_control.{n}" for n in ("ipopt", "nmpc", "sqp")}

@@ -7,9 +7,10 @@ from typing import Optional, Sequence, Union
 import numpy as np
 
 from nmpc_control.ipopt import IpoptSolver
-from nmpc_control.ocp import Instance, Structure, pack_stages, pack_theta
+from nmpc_control.ocp import Instance, Structure
+from nmpc_control.packing import check_arguments, pack_stages, pack_theta
 from nmpc_control.params import Parameters
-from nmpc_control.slots import Slots
+from nmpc_control.slots import Slots, clearance
 from nmpc_control.solution import Guess, Solution, shift
 from nmpc_control.sqp import SqpSolver
 from nmpc_control.state import GRAVITY, Obstacle, Plan, hover_input
@@ -22,9 +23,11 @@ class Nmpc:
         p = parameters.solver
         self.parameters = parameters
         self.structure = Structure(p.horizon, p.dt, p.integrator, p.obstacle_slots)
-        backend = SqpSolver if p.backend == "compiled" else IpoptSolver
-        self.solver: Union[SqpSolver, IpoptSolver] = backend(
-            self.structure, p.budget.tolerance, p.budget.max_iterations, p.budget.time_budget
+        budget = (p.budget.tolerance, p.budget.max_iterations, p.budget.time_budget)
+        self.solver: Union[SqpSolver, IpoptSolver] = (
+            SqpSolver(self.structure, *budget)
+            if p.backend == "compiled"
+            else IpoptSolver(self.structure, *budget, linear_solver=p.linear_solver)
         )
         self._last: Optional[Solution] = None
         self._last_t = 0.0
@@ -73,8 +76,9 @@ class Nmpc:
             u_ref: (4,) or (N, 4) reference input, hover by default.
 
         Raises:
-            ProblemError: a reference or obstacle of wrong shape or not finite.
+            ProblemError: a wrong shape; a time, reference or obstacle that is not finite.
         """
+        check_arguments(t, x0, u_before, u_ref, self.structure.horizon)
         guess = self._guess(t)
         slots = self._slots(t, obstacles, x_ref[:, :3] if guess is None else guess.states[:, :3])
         stages = pack_stages(
@@ -89,7 +93,7 @@ class Nmpc:
             states=solution.states,
             inputs=solution.inputs,
             found=solution.found,
-            status=solution.status,
+            status=solution.status + self._exceeded(solution, x0, slots),
             iterations=solution.iterations,
             solve_time=solution.solve_time,
             cost=solution.cost,
@@ -98,6 +102,16 @@ class Nmpc:
 
     def _pack_theta(self, p: Parameters) -> np.ndarray:
         return pack_theta(p.vehicle, p.weights, p.limits, p.avoidance, self._disturbance)
+
+    def _exceeded(self, solution: Solution, x0: np.ndarray, slots: np.ndarray) -> str:
+        """Return which softened bound the plan exceeds, or into which margin it begins; or ""."""
+        if solution.softened:
+            return f", {solution.softened} exceeded by {solution.violation:.2f}"
+        avoidance = self.parameters.avoidance
+        inside = -clearance(slots[:, 0], x0[:3]).min(initial=np.inf) - avoidance.inflation
+        if avoidance.term == "potential" and inside > 0.0:
+            return f", obstacle margin entered by {inside:.2f}"
+        return ""
 
     def _guess(self, t: float) -> Optional[Guess]:
         if self._last is None:

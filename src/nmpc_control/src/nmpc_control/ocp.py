@@ -23,8 +23,7 @@ import numpy as np
 
 from nmpc_control import constraints
 from nmpc_control.errors import ProblemError
-from nmpc_control.model import INTEGRATORS, MODEL_SIZE, discrete, model_parameters
-from nmpc_control.params import Avoidance, Limits, Vehicle, Weights
+from nmpc_control.model import INTEGRATORS, MODEL_SIZE, discrete
 from nmpc_control.state import NU, NX, YAW
 
 SLOT_SIZE = 5  # centre x, y, z [m]; weight of the vertical distance [1]; 1 / D [1/m]
@@ -105,86 +104,6 @@ class Instance:
     def soft_weight(self) -> float:
         """Weight rho of the L1 penalty on the softened inequalities."""
         return float(self.theta[PARTS["soft_weight"]][0])
-
-
-def pack_theta(
-    vehicle: Vehicle,
-    weights: Weights,
-    limits: Limits,
-    avoidance: Avoidance,
-    disturbance: np.ndarray,
-) -> np.ndarray:
-    """Return the parameter vector (THETA_SIZE,) shared by all stages.
-
-    Raises ProblemError on unusable numbers.
-    """
-    potential, hard = (
-        avoidance.enabled and avoidance.term == "potential",
-        avoidance.enabled and avoidance.term == "hard",
-    )
-    theta = np.concatenate(
-        [
-            model_parameters(vehicle, disturbance),
-            weights.Q,
-            weights.Q_f,
-            weights.R,
-            weights.R_delta,
-            limits.input_min,
-            limits.input_max,
-            [avoidance.eta if potential else 0.0, limits.speed],
-            limits.fence_min,
-            limits.fence_max,
-            limits.input_rate,
-            [limits.soft_weight, float(hard), 1.0],
-        ]
-    )
-    if not np.all(np.isfinite(theta)):
-        raise ProblemError("parameters: got a value that is not finite")
-    for name in ("Q", "Q_f", "R", "R_delta", "eta", "soft_weight", "input_rate"):
-        if np.any(theta[PARTS[name]] < 0):
-            raise ProblemError(f"{name}: got {theta[PARTS[name]]}, expected no negative value")
-    for low, high in (("u_min", "u_max"), ("fence_min", "fence_max")):
-        if np.any(theta[PARTS[low]] >= theta[PARTS[high]]):
-            raise ProblemError(
-                f"{low}: got {theta[PARTS[low]]}, expected less than {high} {theta[PARTS[high]]}"
-            )
-    if not limits.speed > 0:
-        raise ProblemError(f"speed: got {limits.speed}, expected more than 0")
-    return theta
-
-
-def pack_stages(
-    structure: Structure, x_ref: np.ndarray, u_ref: np.ndarray, slots: Sequence[np.ndarray] = ()
-) -> np.ndarray:
-    """Return the stage data (stage_size, N + 1).
-
-    Args:
-        structure: of the problem.
-        x_ref: (N + 1, 10) reference states.
-        u_ref: (4,) or (N, 4) reference inputs.
-        slots: at most ``obstacle_slots`` arrays (N + 1, 5), one per obstacle, see SLOT_SIZE.
-
-    Raises:
-        ProblemError: wrong shape or a value that is not finite.
-    """
-    N = structure.horizon
-    if np.shape(x_ref) != (N + 1, NX) or len(slots) > structure.obstacle_slots:
-        raise ProblemError(
-            f"references: got shape {np.shape(x_ref)} and {len(slots)} obstacles, "
-            f"expected {(N + 1, NX)} and at most {structure.obstacle_slots}"
-        )
-    data = np.empty((structure.stage_size, N + 1), order="F")
-    data[:NX] = x_ref.T
-    data[NX : NX + NU, :N] = np.broadcast_to(u_ref, (N, NU)).T
-    data[NX : NX + NU, N] = data[NX : NX + NU, N - 1]
-    filled = NX + NU + SLOT_SIZE * len(slots)
-    for i, slot in enumerate(slots):
-        data[NX + NU + SLOT_SIZE * i : NX + NU + SLOT_SIZE * (i + 1)] = slot.T
-    empty = np.tile(EMPTY_SLOT, structure.obstacle_slots - len(slots))
-    data[filled:] = empty[:, None]
-    if not np.all(np.isfinite(data)):
-        raise ProblemError("references or obstacles: got a value that is not finite")
-    return data
 
 
 class Symbols:

@@ -64,5 +64,12 @@ class Slots:
         )
 
 
+def clearance(slots: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Return how far (n,) [m] a position (3,) is from where the terms of slots (n, 5) begin."""
+    offset = (position - slots[:, :3]) ** 2
+    offset[:, 2] *= slots[:, 3]
+    return np.sqrt(offset.sum(axis=1)) - 1.0 / slots[:, 4]
+
+
 def _rows(vectors: List[np.ndarray]) -> np.ndarray:
     return np.array(vectors, dtype=float).reshape(-1, 3)

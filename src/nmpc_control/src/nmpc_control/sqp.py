@@ -10,14 +10,14 @@ bounded by the weight of the L1 penalty, are updated whenever the inner iteratio
 """
 
 import time
-from dataclasses import dataclass
-from typing import Dict, List, NamedTuple, Optional, Tuple
+from typing import Dict, List, Optional, Tuple
 
 import casadi as ca
 import numpy as np
 
 from nmpc_control.augmented import MAXIMA
 from nmpc_control.compiled_function import Buffered, compile_functions
+from nmpc_control.newton_step import Step, StepModel, left_to_gain
 from nmpc_control.ocp import PARTS, Instance, Structure
 from nmpc_control.riccati import NZ, SUMMARY, backward
 from nmpc_control.rollout import forward, settle
@@ -25,59 +25,16 @@ from nmpc_control.solution import Guess, Solution, cold_guess, no_solution, wors
 from nmpc_control.state import NU, NX, YAW
 
 _ARMIJO = 1e-4
-_NEWTON_REGION = 0.02  # relative change of the cost below which the exact Hessian is tried
 _LEAST_PIVOT = 1e-6
 _SHORTEST_STEP = 1.0 / 64.0
 _LESS, _MORE = 0.5, 1.3  # times its promise: what a step brings so that another length is tried
-_DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
 _EXCESS = 0.1  # [m], [m/s] times the root of the tolerance: a bound may be exceeded by this
-# a full step is trusted to leave at best this part of what it promised: by the exact Hessian with
-# the same active bounds, with others, by Gauss-Newton
-_LEFT_SAME, _LEFT_CHANGED, _LEFT_GAUSS_NEWTON = 1e-3, 5e-2, 0.5
 _FIRST_ACCURACY = 1e-3  # relative decrease below which the multipliers are first updated
 _SLOW = 0.25  # of the last move of the multipliers: if one is larger, the bounds get stiffer
 _STIFFER, _STIFFEST = 5.0, 1e4
 _ROUNDING = 1e-10  # a smaller promise, relative, is rounding
 _BAD_GUESS = 2.0  # times the cost that the guess had where it comes from
 _SHOWN = 2e-3  # [m], [m/s] by which a softened bound must be exceeded to be reported
-
-
-class Step(NamedTuple):
-    """What a backward sweep says of its step."""
-
-    promise: float  # by how much the cost falls by the full step, to second order
-    slope: float  # of the cost along the step
-    residual: float  # largest projected gradient, scaled by the input ranges
-    active: int  # inputs on a bound
-    changed: bool  # whether the step takes inputs to a bound or away from one
-    exact: bool = False  # whether the model has the exact Hessian
-
-
-@dataclass
-class Model:
-    """Which model of the cost the next step is taken from."""
-
-    newton: bool  # the exact Hessian, where it is positive; else Gauss-Newton
-    damping: float = 0.0
-    refusals: int = 0  # in a row, of the exact Hessian
-    pause: int = 0  # iterations without trying it again
-
-    def refused(self) -> None:
-        """Let some steps pass before the exact Hessian is tried again."""
-        self.newton = False
-        self.refusals += 1
-        self.pause = 2**self.refusals - 1
-
-    def succeeded(self, decrease: float) -> None:
-        """Choose the next model after a step that lowered the cost by a part of itself."""
-        self.damping = self.damping / _DAMPING_FACTOR if self.damping > _DAMPING_FIRST else 0.0
-        self.pause = max(0, self.pause - 1)
-        self.newton = decrease <= _NEWTON_REGION and self.pause == 0
-
-    def failed(self) -> None:
-        """Take a more careful model after a step of which no length lowered the cost."""
-        self.damping = max(self.damping * _DAMPING_FACTOR, _DAMPING_FIRST)
-        self.newton = False
 
 
 def sweeps(structure: Structure) -> List[ca.Function]:
@@ -135,14 +92,14 @@ class SqpSolver:
             if left > self.tolerance and not stationary:
                 iterations += 1
                 new_cost, alpha = self._search(cost, step)
-                if new_cost is None and (left < _ROUNDING or model.damping >= _DAMPING_LAST):
+                if new_cost is None and (left < _ROUNDING or model.exhausted):
                     status = "stalled"
                     break
                 if new_cost is None:
                     model.failed()
                     continue
                 full = alpha == 1.0 and model.damping == 0.0
-                left = _left(step, cost - new_cost) / scale if full else np.inf
+                left = left_to_gain(step, cost - new_cost) / scale if full else np.inf
                 model.succeeded((cost - new_cost) / scale)
                 cost = new_cost
             if left <= accuracy or stationary:
@@ -174,7 +131,7 @@ class SqpSolver:
             multipliers=a["multipliers"].T.copy(),
         )
 
-    def _begin(self, instance: Instance, guess: Optional[Guess]) -> Tuple[float, Model]:
+    def _begin(self, instance: Instance, guess: Optional[Guess]) -> Tuple[float, StepModel]:
         """Set the first iterate; return its cost and the first model."""
         trials = []
         if guess is not None and np.all(np.isfinite(guess.inputs)):
@@ -182,7 +139,7 @@ class SqpSolver:
             cost = self._evaluate(0.0)
             if cost <= _BAD_GUESS * (1.0 + guess.cost):
                 self._accept()
-                return cost, Model(newton=guess.gains is not None)
+                return cost, StepModel(newton=guess.gains is not None)
             trials.append(self._trial())
         hover = cold_guess(instance.x0, self.structure.horizon)
         self._load(hover.states, hover.inputs)
@@ -192,18 +149,18 @@ class SqpSolver:
         states = instance.stages[:NX].T.copy()
         states[:, YAW] = np.unwrap(np.r_[instance.x0[YAW], states[:, YAW]])[1:]
         self._load(states, instance.stages[NX : NX + NU, :-1].T)
-        self._direction(Model(newton=False))
+        self._direction(StepModel(newton=False))
         for alpha in (0.0, 1.0):
             self._evaluate(alpha)
             trials.append(self._trial())
         trials = [trial for trial in trials if np.isfinite(trial[0])]
         if not trials:
-            return np.inf, Model(False)
+            return np.inf, StepModel(False)
         _, X, U = min(trials, key=lambda trial: trial[0])
         self._load(X, U)
         cost = self._evaluate(0.0)
         self._accept()
-        return cost, Model(newton=False)
+        return cost, StepModel(newton=False)
 
     def _load(
         self,
@@ -229,7 +186,7 @@ class SqpSolver:
         a = self._arrays
         return float(a["cost"].sum()), a["X_new"].T.copy(), a["U_new"].T.copy()
 
-    def _direction(self, model: Model) -> Step:
+    def _direction(self, model: StepModel) -> Step:
         """Compute step and gains, by the exact Hessian if that is wanted and positive."""
         self._arrays["damping"][0, 0] = model.damping
         self._arrays["clamping"][0, 0] = 1.0
@@ -325,16 +282,3 @@ class SqpSolver:
         worst = self._arrays["maxima"][1:, 0]
         violation, kind = worst_violation(worst[None], MAXIMA[1:], _SHOWN)
         return violation, kind, self._tracking + float(self._arrays["sums"][1, 0])
-
-
-def _left(step: Step, decrease: float) -> float:
-    """Return an estimate of what the cost can still fall by after a full step.
-
-    What the model missed, ``promise - decrease``, is a term of third order T d^3 / 6; the gradient
-    that the step leaves is T d^2 / 2, and a Newton step on that lowers the cost by half its square
-    over the curvature. With d^2 times curvature = 2 promise, this is (9 / 4) missed^2 / promise.
-    """
-    missed = abs(step.promise - decrease)
-    part = _LEFT_CHANGED if step.changed else _LEFT_SAME
-    least = (part if step.exact else _LEFT_GAUSS_NEWTON) * step.promise
-    return max(9.0 / 4.0 * missed**2 / max(step.promise, 1e-300), least)

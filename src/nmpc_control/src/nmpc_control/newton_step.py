@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""What one Newton step says, which model the next one is taken from, and what is left to gain."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+_NEWTON_REGION = 0.02  # relative change of the cost below which the exact Hessian is tried
+_DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
+# a full step is trusted to leave at best this part of what it promised: by the exact Hessian with
+# the same active bounds, with others, by Gauss-Newton
+_LEFT_SAME, _LEFT_CHANGED, _LEFT_GAUSS_NEWTON = 1e-3, 5e-2, 0.5
+
+
+class Step(NamedTuple):
+    """What a backward sweep says of its step."""
+
+    promise: float  # by how much the cost falls by the full step, to second order
+    slope: float  # of the cost along the step
+    residual: float  # largest projected gradient, scaled by the input ranges
+    active: int  # inputs on a bound
+    changed: bool  # whether the step takes inputs to a bound or away from one
+    exact: bool = False  # whether the model has the exact Hessian
+
+
+@dataclass
+class StepModel:
+    """Which model of the cost the next step is taken from."""
+
+    newton: bool  # the exact Hessian, where it is positive; else Gauss-Newton
+    damping: float = 0.0
+    refusals: int = 0  # in a row, of the exact Hessian
+    pause: int = 0  # iterations without trying it again
+
+    def refused(self) -> None:
+        """Let some steps pass before the exact Hessian is tried again."""
+        self.newton = False
+        self.refusals += 1
+        self.pause = 2**self.refusals - 1
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether more damping is no use."""
+        return self.damping >= _DAMPING_LAST
+
+    def succeeded(self, decrease: float) -> None:
+        """Choose the next model after a step that lowered the cost by a part of itself."""
+        self.damping = self.damping / _DAMPING_FACTOR if self.damping > _DAMPING_FIRST else 0.0
+        self.pause = max(0, self.pause - 1)
+        self.newton = decrease <= _NEWTON_REGION and self.pause == 0
+
+    def failed(self) -> None:
+        """Take a more careful model after a step of which no length lowered the cost."""
+        self.damping = max(self.damping * _DAMPING_FACTOR, _DAMPING_FIRST)
+        self.newton = False
+
+
+def left_to_gain(step: Step, decrease: float) -> float:
+    """Return an estimate of what the cost can still fall by after a full step.
+
+    What the model missed, ``promise - decrease``, is a term of third order T d^3 / 6; the gradient
+    that the step leaves is T d^2 / 2, and a Newton step on that lowers the cost by half its square
+    over the curvature. With d^2 times curvature = 2 promise, this is (9 / 4) missed^2 / promise.
+    """
+    missed = abs(step.promise - decrease)
+    part = _LEFT_CHANGED if step.changed else _LEFT_SAME
+    least = (part if step.exact else _LEFT_GAUSS_NEWTON) * step.promise
+    return max(9.0 / 4.0 * missed**2 / max(step.promise, 1e-300), least)
