@@ -181,6 +181,28 @@ def test_warm_start_needs_fewer_iterations_than_a_cold_one(compiled):
     assert warm.cost == pytest.approx(cold.cost, rel=1e-6)
 
 
+def test_a_target_ten_metres_away_is_reached_from_hover_in_thirty_iterations(compiled):
+    rng = np.random.default_rng(14)
+    x0 = hover_state(np.array([0.0, 0.0, 15.0]))
+    for way in rng.normal(size=(20, 3)) * [1.0, 1.0, 0.3]:
+        target = hover_state(x0[:3] + 10.0 * way / np.linalg.norm(way))
+        compiled.reset()
+        plan = compiled.solve(0.0, x0, np.tile(target, (61, 1)), hover_input())
+        assert plan.status == "converged"
+        assert plan.iterations <= 30
+        assert np.linalg.norm(plan.states[-1, :3] - target[:3]) < 0.5
+
+
+@pytest.mark.parametrize("seed", [15, 16])
+def test_a_guess_far_from_the_state_is_no_worse_than_none(compiled, seed):
+    """A jump of the position by metres is solved as from hover, not from where it was."""
+    x0, jumped = random_states(2, seed=seed)
+    jumped[:3] += [4.0, -3.0, 1.0]
+    cold = solve(compiled, jumped).cost
+    solve(compiled, x0)
+    assert solve(compiled, jumped, cold=False).cost == pytest.approx(cold, rel=1e-4)
+
+
 def test_useless_guess_falls_back_to_hover(compiled):
     x0 = random_states(1, seed=10)[0]
     reference = solve(compiled, x0).cost

@@ -65,6 +65,7 @@ class SqpSolver:
         self._backward, self._backward_exact = calls["backward"], calls["backward_exact"]
         self._forward, self._settle = calls["forward"], calls["settle"]
         self._tracking, self._penalties = np.inf, 0.0  # cost of the iterate
+        self._alpha = 1.0  # the last step's length
         self._forced = False  # whether any multiplier is not zero
 
     def solve(self, instance: Instance, guess: Optional[Guess] = None) -> Solution:
@@ -79,6 +80,7 @@ class SqpSolver:
         a = self._arrays
         a["x0"][:, 0], a["u_before"][:, 0] = instance.x0, instance.u_before
         a["stages"][:], a["theta"][:, 0] = instance.stages, instance.theta
+        self._alpha = 1.0
         cost, model = self._begin(instance, guess)
         accuracy, excess, before = _FIRST_ACCURACY, _EXCESS * self.tolerance**0.5, np.inf
         iterations, status, step = 0, "budget", Step(np.inf, -np.inf, np.inf, 0, False)
@@ -223,11 +225,12 @@ class SqpSolver:
         obstacle the convex model sees too much curvature). Returns the new cost, None when there is
         none, and the step's length.
         """
-        alpha = 1.0
+        alpha = min(1.0, 2.0 * self._alpha)
         new_cost = self._evaluate(alpha)
         while not new_cost <= cost + _ARMIJO * alpha * step.slope:
             alpha /= 2.0
             if alpha < _SHORTEST_STEP:
+                self._alpha = 1.0
                 return None, alpha
             new_cost = self._evaluate(alpha)
         self._accept()
@@ -240,6 +243,7 @@ class SqpSolver:
             self._accept()
             alpha, new_cost = factor * alpha, other
             gain = (cost - new_cost) / (alpha * step.promise)
+        self._alpha = alpha
         return new_cost, alpha
 
     def _accept(self) -> None:
