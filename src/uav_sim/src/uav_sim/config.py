@@ -59,7 +59,8 @@ def load_yaml(path: Source) -> Dict[str, Any]:
 def from_dict(cls: Type[T], data: Any, source: str, key: str = "") -> T:
     """Build the dataclass ``cls`` from a mapping.
 
-    A field's metadata may give ``min`` and ``max`` of a number, or the ``choices`` of a text.
+    A field's metadata may give ``min`` and ``max`` of a number, or the ``choices`` of a text. A
+    field with a default may be missing; a tuple of numbers is a list in YAML.
 
     Raises:
         ConfigError: naming source, key, value and what was expected.
@@ -73,11 +74,12 @@ def from_dict(cls: Type[T], data: Any, source: str, key: str = "") -> T:
         if name not in fields:
             raise ConfigError(source, f"{prefix}{name}", data[name], f"one of {', '.join(fields)}")
     for name in fields:
-        if name not in data:
+        if name not in data and fields[name].default is dataclasses.MISSING:
             raise ConfigError(source, f"{prefix}{name}", None, "a value, but the key is missing")
     values = {
         name: _convert(data[name], hints[name], f.metadata, source, prefix + name)
         for name, f in fields.items()
+        if name in data
     }
     return cls(**values)
 
@@ -104,6 +106,15 @@ def numbers(
     return tuple(number(v, source, f"{key}[{i}]", low) for i, v in enumerate(value))
 
 
+def merged(data: Dict[str, Any], changes: Dict[str, Any]) -> Dict[str, Any]:
+    """Return ``data`` with the values of ``changes`` in place of its own, mapping by mapping."""
+    result = dict(data)
+    for key, value in changes.items():
+        both = isinstance(value, dict) and isinstance(result.get(key), dict)
+        result[key] = merged(result[key], value) if both else value
+    return result
+
+
 def _convert(value: Any, hint: Any, metadata: Any, source: str, key: str) -> Any:
     if getattr(hint, "__origin__", None) is Union:
         hint = _matching(hint.__args__, value, source, key)
@@ -112,13 +123,24 @@ def _convert(value: Any, hint: Any, metadata: Any, source: str, key: str) -> Any
     if hint is float:
         low, high = metadata.get("min", -math.inf), metadata.get("max", math.inf)
         return number(value, source, key, low, high)
+    if getattr(hint, "__origin__", None) is tuple:
+        return numbers(value, source, key, len(hint.__args__), metadata.get("min", -math.inf))
     if hint is bool:
         if not isinstance(value, bool):
             raise ConfigError(source, key, value, "true or false")
         return value
+    if hint is int:
+        return _whole(value, metadata, source, key)
     choices: Optional[Tuple[str, ...]] = metadata.get("choices")
     if not isinstance(value, str) or (choices and value not in choices):
         raise ConfigError(source, key, value, f"one of {', '.join(choices)}" if choices else "text")
+    return value
+
+
+def _whole(value: Any, metadata: Any, source: str, key: str) -> int:
+    low, high = metadata["min"], metadata["max"]
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise ConfigError(source, key, value, f"a whole number in [{low}, {high}]")
     return value
 
 

@@ -3,15 +3,19 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import List, Union
+from typing import Any, Dict, List, Optional, Union
 
-from uav_sim.config import config_directory, from_dict, load_yaml
+from uav_sim.config import config_directory, from_dict, load_yaml, merged
 from uav_sim.errors import ConfigError
 
 PACKET_PERIOD = 0.01  # [s] between two packets of the M100's serial link (doc/dji_sdk.md 2.1)
 
 
 def _number(low: float = 0.0, high: float = math.inf) -> float:
+    return field(metadata={"min": low, "max": high})
+
+
+def _whole(low: int, high: int) -> int:
     return field(metadata={"min": low, "max": high})
 
 
@@ -110,6 +114,21 @@ class Loops:
 
 
 @dataclass(frozen=True)
+class Undocumented:
+    """What DJI's code and documents leave open; each choice stands in ``common.yaml``."""
+
+    silence: str = field(metadata={"choices": ("hover", "level")})  # flown after cmd_timeout, in F
+    stable_angle_holds: bool = field()
+    tasks_need_authority: bool = field()
+    authority_survives_toggle: bool = field()
+    authority_time: float = _number()  # [s]
+    wrong_mode_ack: int = _whole(0, 6)
+    activation_ack: int = _whole(0, 0xFFFF)
+    idle_flight_status: int = _whole(0, 5)
+    velocity_z_sign: float = _number(-1.0, 1.0)  # [1]
+
+
+@dataclass(frozen=True)
 class FlightController:
     """Behaviour of the flight controller; what each number rests on stands in ``common.yaml``."""
 
@@ -129,6 +148,7 @@ class FlightController:
     rc_lost_time: float = _number()  # [s]
     rc: RcValues = field()
     loops: Loops = field()
+    undocumented: Undocumented = field()
 
 
 @dataclass(frozen=True)
@@ -173,8 +193,15 @@ def preset_names() -> List[str]:
     return sorted(path.stem for path in (config_directory() / "presets").glob("*.yaml"))
 
 
-def load_preset(name: str) -> PlantPreset:
+def load_preset(
+    name: str, changes: Optional[Dict[str, Any]] = None, source: str = "changes"
+) -> PlantPreset:
     """Return the preset of ``config/presets/<name>.yaml`` with the rest from ``common.yaml``.
+
+    Args:
+        name: of the preset.
+        changes: values of the same keys that win over both files.
+        source: where the changes come from, for the words of an error.
 
     Raises:
         ConfigError: no such preset, or one that is wrong.
@@ -185,6 +212,8 @@ def load_preset(name: str) -> PlantPreset:
     path = directory / "presets" / f"{name}.yaml"
     data = {**load_yaml(directory / "common.yaml"), **load_yaml(path)}
     preset = from_dict(PlantPreset, data, path.name)
+    if changes:
+        preset = from_dict(PlantPreset, merged(data, changes), source)
     steps = PACKET_PERIOD / preset.step
     if abs(steps - round(steps)) > 1e-9:
         raise ConfigError(path.name, "step", preset.step, f"a divisor of {PACKET_PERIOD} s")
