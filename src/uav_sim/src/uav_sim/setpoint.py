@@ -70,6 +70,17 @@ class Setpoint:
     z: float  # velocity [m/s], height above take-off [m] or thrust [percent]
     yaw: float  # clockwise: angle from north [deg] or rate [deg/s]
 
+    @property
+    def modes(self) -> str:
+        """The control byte in words."""
+        words = (
+            f"horizontal {self.horizontal.name}",
+            f"vertical {self.vertical.name}",
+            f"yaw {self.yaw_mode.name}",
+            self.frame.name,
+        )
+        return ", ".join(words).lower() + (", stable" if self.stable else "")
+
 
 def decode(suffix: str, axes: Sequence[float]) -> Setpoint:
     """Return the setpoint in a Joy message's axes as the flight controller gets it.
