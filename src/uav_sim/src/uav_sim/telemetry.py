@@ -101,6 +101,7 @@ class Telemetry:
         self.frame = LocalFrame(plant.preset.home)
         self._plant = plant
         self._delay = plant.preset.delay.telemetry
+        self._velocity_z_sign = plant.preset.flight_controller.undocumented.velocity_z_sign
         self._scale = plant.preset.gravity_const / plant.preset.gravity
         self._count = 0
         self._pending: Deque[Packet] = deque()
@@ -153,9 +154,9 @@ class Telemetry:
             place = self.frame.to_earth(plant.position)
             values.insert(0, ("rc", rc))
             values += [("gps_health", gps_health), ("gps_position", place)]
-            if self.frame.reference is not None:
-                values.append(("local_position", self.frame.to_local(place)))
-            values += [("height_above_takeoff", height), ("velocity", plant.velocity)]
+            vx, vy, vz = plant.velocity
+            velocity = (vx, vy, self._velocity_z_sign * vz)
+            values += [("height_above_takeoff", height), ("velocity", velocity)]
         if count % _SLOW == 0:
             values.append(("battery_state", battery))
         if count % _MEDIUM == 0:
@@ -170,11 +171,15 @@ class Telemetry:
         pending, packets = self._pending, []
         while pending and pending[0].t <= t + 1e-9:
             packet = pending.popleft()
-            if packet.topic == "gps_position":
-                self._place = packet.value
-            elif packet.topic == "gps_health":
-                self._health = packet.value
             packets.append(packet)
+            if packet.topic == "gps_health":
+                self._health = packet.value
+            elif packet.topic == "gps_position":
+                self._place = packet.value
+                # The node computes it on receipt: a reference counts from the next packet on.
+                if self.frame.reference is not None:
+                    local = self.frame.to_local(packet.value)
+                    packets.append(Packet("local_position", packet.t, local))
         return packets
 
     def _refer(self, t: float, place: GeoPoint) -> None:
