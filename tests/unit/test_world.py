@@ -73,7 +73,7 @@ def test_a_moving_obstacle_hits_a_standing_aircraft():
     world = fly(World.from_list([entry], 0.5), *[(0.0, 0.0, 5.0)] * 6)
     (collision,) = world.collisions
     assert 0.2 < collision.t <= 0.3
-    assert world.obstacles[0].position_at(0.5) == pytest.approx((10.0, 0.0, 5.0))
+    assert world.states()[0].position == pytest.approx((10.0, 0.0, 5.0))
 
 
 def test_skipping_far_obstacles_changes_no_clearance():
@@ -92,7 +92,7 @@ def test_skipping_far_obstacles_changes_no_clearance():
         for i, obstacle in enumerate(obstacles):
             t0 = max(0.0, t - 0.01)
             ends = [
-                tuple(a - b for a, b in zip(p, obstacle.position_at(s)))
+                tuple(a - b for a, b in zip(p, obstacle.path.position(s)))
                 for p, s in ((before, t0), (position, t))
             ]
             least[i] = min(least[i], obstacle.nearest(*ends)[0])

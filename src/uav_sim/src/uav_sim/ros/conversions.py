@@ -19,8 +19,8 @@ from std_msgs.msg import Float32, Header, String, UInt8
 
 from nmpc_msgs.msg import Obstacle as ObstacleMsg
 from nmpc_msgs.msg import ObstacleArray
+from uav_sim.body import BodyState
 from uav_sim.m100 import Truth
-from uav_sim.obstacle import Obstacle
 from uav_sim.telemetry import quaternion, to_body
 from uav_sim.world import Collision
 
@@ -121,18 +121,18 @@ def truth_to_odometry(stamp: rospy.Time, truth: Truth, frame_id: str) -> Odometr
 
 
 def obstacles_to_msg(
-    stamp: rospy.Time, t: float, obstacles: Sequence[Obstacle], frame_id: str
+    stamp: rospy.Time, states: Sequence[BodyState], frame_id: str
 ) -> ObstacleArray:
-    """Return the obstacles as they are at simulated time ``t`` [s]."""
+    """Return obstacles as they are at the time of the stamp."""
     message = ObstacleArray(header=Header(0, stamp, frame_id))
-    for obstacle in obstacles:
+    for obstacle, position, velocity in states:
         message.obstacles.append(
             ObstacleMsg(
                 id=obstacle.id,
                 shape=_SHAPES[obstacle.shape],
                 size=list(obstacle.size),
-                position=Point(*obstacle.position_at(t)),
-                velocity=Vector3(*obstacle.velocity),
+                position=Point(*position),
+                velocity=Vector3(*velocity),
             )
         )
     return message

@@ -100,7 +100,7 @@ class SimulatorNode:
         if self._steps % self._truth_steps == 0:
             self._truth.publish(truth_to_odometry(stamp, truth, frame_id))
         if sim.world.obstacles and self._steps % self._obstacle_steps == 0:
-            self._obstacles.publish(obstacles_to_msg(stamp, t, sim.world.obstacles, frame_id))
+            self._obstacles.publish(obstacles_to_msg(stamp, sim.world.states(), frame_id))
         for collision in collisions:
             message = collision_to_msg(collision)
             self._collision.publish(message)
