@@ -6,6 +6,7 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from uav_sim.autopilot import Ack, Autopilot, Phase, Receipt
 from uav_sim.errors import SetpointError
+from uav_sim.faults.engine import NO_RESPONSE, Faults
 from uav_sim.plant import Plant, Vector
 from uav_sim.preset import PACKET_PERIOD, PlantPreset
 from uav_sim.remote_control import RemoteControl
@@ -28,7 +29,8 @@ class SimulatedM100:
     """Plant, flight controller, link and surroundings on one clock; deterministic.
 
     Begins on the ground at the world's origin with motors off and the RC in F. ``rc`` as well as
-    ``wind``, ``thrust_gain`` and ``mass_factor`` of ``plant`` may be changed at any time.
+    ``wind``, ``thrust_gain`` and ``mass_factor`` of ``plant`` may be changed at any time;
+    ``faults`` are begun and ended at any time or by schedule.
     """
 
     def __init__(self, preset: PlantPreset, world: Optional[World] = None) -> None:
@@ -40,6 +42,7 @@ class SimulatedM100:
         self.autopilot = Autopilot(self.plant, self.rc)
         self.world = world or World((), preset.radius)
         self.new_collisions: List[Collision] = []  # of the last step
+        self.faults = Faults(self)
         self._telemetry = Telemetry(self.plant)
         self._steps = 0
         self._steps_per_packet = round(PACKET_PERIOD / preset.step)
@@ -67,6 +70,7 @@ class SimulatedM100:
     def step(self) -> List[Packet]:
         """Advance by ``preset.step``; return the packets received in it, oldest first."""
         plant = self.plant
+        self.faults.update(self.t)
         self.autopilot.update(self.t)
         plant.step()
         self._steps += 1
@@ -83,7 +87,7 @@ class SimulatedM100:
                 flight_status=self.autopilot.flight_status,
                 battery=float(math.ceil(self.battery)),
             )
-        return self._telemetry.due(self.t)
+        return self.faults.filter(self.t, self._telemetry.due(self.t))
 
     def run(self, duration: float) -> List[Packet]:
         """Advance by a duration [s]; return all packets received."""
@@ -91,6 +95,9 @@ class SimulatedM100:
 
     def setpoint(self, suffix: str, axes: Sequence[float]) -> Receipt:
         """Send axes on the topic ``flight_control_setpoint_<suffix>``; say what became of them."""
+        fault = self.faults.objection(suffix)
+        if fault:
+            return Receipt(False, fault)
         try:
             setpoint = decode(suffix, axes)
         except SetpointError as error:
@@ -99,19 +106,19 @@ class SimulatedM100:
 
     def control_authority(self, enable: bool) -> Ack:
         """Obtain or release the control authority."""
-        return self.autopilot.control_authority(enable)
+        return self._reply(1, 0) or self.autopilot.control_authority(enable)
 
     def arm(self, start: bool) -> Ack:
         """Start or stop the motors on the ground."""
-        return self.autopilot.arm(self.t, start)
+        return self._reply(1, 5) or self.autopilot.arm(self.t, start)
 
     def task(self, number: int) -> Ack:
         """Start a task: 1 go home, 4 take off, 6 land."""
-        return self.autopilot.task(self.t, number)
+        return self._reply(1, 1) or self.autopilot.task(self.t, number)
 
     def set_local_position_reference(self) -> bool:
         """Make the newest GPS position the origin of ``local_position``."""
-        return self._telemetry.set_local_position_reference(self.t)
+        return not self.faults.dead and self._telemetry.set_local_position_reference(self.t)
 
     @property
     def phase(self) -> Phase:
@@ -135,3 +142,7 @@ class SimulatedM100:
     def clearance(self) -> Dict[str, float]:
         """Least distance [m] from hull to each obstacle's surface since the flight began, by id."""
         return self.world.clearance
+
+    def _reply(self, cmd_set: int, cmd_id: int) -> Optional[Ack]:
+        """Return the reply of a dead node: none; None if it lives."""
+        return Ack(False, cmd_set, cmd_id, NO_RESPONSE) if self.faults.dead else None

@@ -25,12 +25,16 @@ class Plant:
     """Rigid body that follows attitude, thrust and yaw rate commands as identified.
 
     Advances in fixed steps: attitude responses exactly, translation by the midpoint rule.
-    ``thrust_gain`` multiplies the force, ``mass_factor`` the mass; ``wind`` is the air's velocity.
+    ``thrust_gain`` multiplies the force, ``mass_factor`` the mass; ``wind`` and ``gust`` add up to
+    the air's velocity; ``reference_bias`` is added to what roll, pitch [rad] and yaw rate [rad/s]
+    follow.
     """
 
     def __init__(self, preset: PlantPreset) -> None:
         self.preset = preset
         self.wind: Vector = (0.0, 0.0, 0.0)
+        self.gust: Vector = (0.0, 0.0, 0.0)
+        self.reference_bias: Vector = (0.0, 0.0, 0.0)
         self.thrust_gain = 1.0
         self.mass_factor = 1.0
         step, delay = preset.step, preset.delay
@@ -104,9 +108,10 @@ class Plant:
         free = 0.0 if self.on_ground else 1.0
         roll_before, pitch_before, yaw_before = roll.value, pitch.value, self.yaw
         rate_before = yaw_rate.value
-        roll.advance(free * self._roll_line.push(self._roll_ref))
-        pitch.advance(free * self._pitch_line.push(self._pitch_ref))
-        yaw_rate.advance(free * self._yaw_rate_line.push(self._yaw_rate_ref))
+        bias = self.reference_bias
+        roll.advance(free * (self._roll_line.push(self._roll_ref) + bias[0]))
+        pitch.advance(free * (self._pitch_line.push(self._pitch_ref) + bias[1]))
+        yaw_rate.advance(free * (self._yaw_rate_line.push(self._yaw_rate_ref) + bias[2]))
         self.yaw = yaw_before + 0.5 * self.preset.step * (rate_before + yaw_rate.value)
         phi, theta = 0.5 * (roll_before + roll.value), 0.5 * (pitch_before + pitch.value)
         psi = 0.5 * (yaw_before + self.yaw)
@@ -141,8 +146,8 @@ class Plant:
         self, force: Vector, vx: float, vy: float, vz: float, cos_yaw: float, sin_yaw: float
     ) -> Vector:
         """Return the acceleration (3,) of thrust, drag and gravity in free air."""
-        drag, wind = self.preset.drag, self.wind
-        vx, vy, vz = vx - wind[0], vy - wind[1], vz - wind[2]
+        drag, wind, gust = self.preset.drag, self.wind, self.gust
+        vx, vy, vz = vx - wind[0] - gust[0], vy - wind[1] - gust[1], vz - wind[2] - gust[2]
         if self._heading_drag:
             forward = drag.x * (cos_yaw * vx + sin_yaw * vy)
             left = drag.y * (cos_yaw * vy - sin_yaw * vx)

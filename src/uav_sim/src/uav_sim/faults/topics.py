@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: MIT
+"""Faults of what is received: frozen, dropped, delayed, not a number, jumping."""
+
+import dataclasses
+import math
+import random
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any, Callable, Deque, Dict, List, Tuple
+
+from uav_sim.faults.base import Context, Fault
+from uav_sim.plant import Vector
+from uav_sim.preset import GeoPoint
+from uav_sim.telemetry import EARTH_RADIUS, Packet, quaternion
+
+ALL = "all"
+NUMBERS = (
+    "attitude",
+    "imu",
+    "velocity",
+    "gps_position",
+    "local_position",
+    "height_above_takeoff",
+    "rc",
+    "battery_state",
+    "gimbal_angle",
+)
+TELEMETRY = (*NUMBERS, "gps_health", "flight_status")
+SURROUNDINGS = ("obstacles", "scan", "vicon")  # not of dji_sdk; they can be late or missing too
+TOPICS = (ALL, *TELEMETRY, *SURROUNDINGS)
+_BYTE = 255
+
+
+def map_numbers(value: Any, change: Callable[[float], float]) -> Any:
+    """Return a packet's value with every floating point number changed."""
+    if isinstance(value, float):
+        return change(value)
+    if isinstance(value, tuple):
+        parts = [map_numbers(part, change) for part in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    parts = {f.name: map_numbers(getattr(value, f.name), change) for f in dataclasses.fields(value)}
+    return dataclasses.replace(value, **parts)
+
+
+def shifted(topic: str, value: Any, offset: Vector) -> Any:
+    """Return a packet's value displaced by an offset (3,) in the topic's own unit.
+
+    Attitudes turn by roll, pitch, yaw [rad] about world axes; ``imu`` changes its body rates
+    [rad/s], ``gps_position`` moves by metres east, north, up; a scalar takes the first number,
+    ``rc`` adds to its first three axes.
+    """
+    if topic == "attitude":
+        return _product(quaternion(*offset), value)
+    if topic == "imu":
+        return value._replace(angular_velocity=_sum(value.angular_velocity, offset))
+    if isinstance(value, GeoPoint):
+        circle = EARTH_RADIUS * math.cos(math.radians(value.latitude))
+        return GeoPoint(
+            value.latitude + math.degrees(offset[1] / EARTH_RADIUS),
+            value.longitude + math.degrees(offset[0] / circle),
+            value.altitude + offset[2],
+        )
+    if isinstance(value, int):
+        return min(max(value + round(offset[0]), 0), _BYTE)
+    if isinstance(value, tuple):
+        return _sum(value[:3], offset) + tuple(value[3:])
+    return value + offset[0]
+
+
+@dataclass
+class TopicFault(Fault):
+    """A fault of one topic below ``dji_sdk/``, of ``obstacles``, ``scan``, ``vicon``, or of all."""
+
+    topic: str = field(metadata={"choices": TOPICS})
+
+    def concerns(self, packet: Packet) -> bool:
+        """Return whether this fault acts on a packet."""
+        return self.topic in (packet.topic, ALL)
+
+
+@dataclass
+class TopicFrozen(TopicFault):
+    """The value no longer changes; messages go on with new stamps."""
+
+    def begin(self, context: Context) -> None:
+        """Hold on to the first value of each topic from now on."""
+        self._values: Dict[str, Any] = {}
+
+    def filter(self, t: float, packets: List[Packet]) -> List[Packet]:
+        """Repeat the first value."""
+        return [
+            p._replace(value=self._values.setdefault(p.topic, p.value)) if self.concerns(p) else p
+            for p in packets
+        ]
+
+
+@dataclass
+class TopicDropped(TopicFault):
+    """Messages are lost: all of them, or each with a probability."""
+
+    probability: float = field(default=1.0, metadata={"min": 0.0, "max": 1.0})  # [1]
+
+    def begin(self, context: Context) -> None:
+        """Take the fault's own random numbers."""
+        self._random: random.Random = context.random
+
+    def filter(self, t: float, packets: List[Packet]) -> List[Packet]:
+        """Lose messages."""
+        return [
+            p
+            for p in packets
+            if not (self.concerns(p) and self._random.random() < self.probability)
+        ]
+
+
+@dataclass
+class TopicDelayed(TopicFault):
+    """Messages come late, with the stamp of their late receipt; the order is kept."""
+
+    delay: float = field(default=0.2, metadata={"min": 0.0, "max": 60.0})  # [s]
+
+    def begin(self, context: Context) -> None:
+        """Hold nothing back yet."""
+        self._held: Deque[Packet] = deque()
+
+    def filter(self, t: float, packets: List[Packet]) -> List[Packet]:
+        """Hold messages back."""
+        prompt = []
+        for packet in packets:
+            if self.concerns(packet):
+                self._held.append(packet._replace(t=packet.t + self.delay))
+            else:
+                prompt.append(packet)
+        late = []
+        while self._held and self._held[0].t <= t + 1e-9:
+            late.append(self._held.popleft())
+        return late + prompt
+
+    def flush(self) -> List[Packet]:
+        """All that is late comes at once when the fault ends."""
+        return list(self._held)
+
+
+@dataclass
+class TopicNan(TopicFault):
+    """Every number is NaN."""
+
+    topic: str = field(metadata={"choices": NUMBERS})
+
+    def filter(self, t: float, packets: List[Packet]) -> List[Packet]:
+        """Replace every number."""
+        return [
+            p._replace(value=map_numbers(p.value, lambda _: math.nan)) if self.concerns(p) else p
+            for p in packets
+        ]
+
+
+@dataclass
+class TopicJump(TopicFault):
+    """The value jumps by an offset and stays there, or jumps to and fro."""
+
+    topic: str = field(metadata={"choices": TELEMETRY})
+    offset: Tuple[float, float, float]  # in the topic's unit, see ``shifted``
+    period: float = field(default=0.0, metadata={"min": 0.0})  # [s] on and off again; 0: stays
+
+    def begin(self, context: Context) -> None:
+        """Count the period from now."""
+        self._since = context.since
+
+    def filter(self, t: float, packets: List[Packet]) -> List[Packet]:
+        """Displace the value."""
+        if self.period > 0.0 and (t - self._since) % self.period >= 0.5 * self.period:
+            return packets
+        return [
+            p._replace(value=shifted(p.topic, p.value, self.offset)) if self.concerns(p) else p
+            for p in packets
+        ]
+
+
+def _sum(a: Tuple[float, ...], b: Tuple[float, ...]) -> Tuple[float, ...]:
+    return tuple(x + y for x, y in zip(a, b))
+
+
+def _product(p: Tuple[float, ...], q: Tuple[float, ...]) -> Tuple[float, ...]:
+    """Return the Hamilton product of two quaternions x, y, z, w."""
+    (px, py, pz, pw), (qx, qy, qz, qw) = p, q
+    return (
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+        pw * qw - px * qx - py * qy - pz * qz,
+    )
