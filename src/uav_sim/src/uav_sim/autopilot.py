@@ -149,6 +149,8 @@ class Autopilot:
     @authority.setter
     def authority(self, held: bool) -> None:
         self.control.held = held
+        if not held:
+            self._setpoint_time = None
 
     @property
     def _without_setpoint(self) -> str:

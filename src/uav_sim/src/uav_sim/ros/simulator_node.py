@@ -3,6 +3,7 @@
 
 ROS parameters (private):
     preset: plant preset, a file in ``config/presets``.
+    settings_file: YAML of values that win over those of ``common.yaml`` and the preset; or empty.
     scenario_file: YAML of which only ``obstacles`` and ``spawn`` are read; empty: neither.
         ``spawn`` is where the aircraft stands; with z > 0 it begins there hovering with motors on.
     speed_factor: simulated seconds per second; 0 runs as fast as possible.
@@ -139,7 +140,10 @@ def _settings() -> Settings:
 
 
 def _simulator() -> SimulatedM100:
-    preset = load_preset(rospy.get_param("~preset", "dji_hil"))
+    changes = rospy.get_param("~settings_file", "")
+    preset = load_preset(
+        rospy.get_param("~preset", "dji_hil"), load_yaml(changes) if changes else None, changes
+    )
     path = rospy.get_param("~scenario_file", "")
     if not path:
         return SimulatedM100(preset)
