@@ -13,6 +13,7 @@ from dji_sdk.msg import GPSUTC, FCTimeInUTC, MobileData, PayloadData, VOPosition
 from uav_sim.m100 import SimulatedM100
 from uav_sim.ros.conversions import TELEMETRY
 from uav_sim.ros.payload_services import PayloadServices
+from uav_sim.ros.ports import Ports
 from uav_sim.ros.services import FlightServices
 from uav_sim.ros.throttle import Throttle
 from uav_sim.setpoint import FLAGS, TOPIC_PREFIX
@@ -43,8 +44,9 @@ SILENT = {
 class DjiSdkServer:
     """Publishes packets; hands setpoints and requests to the simulator, under its lock."""
 
-    def __init__(self, sim: SimulatedM100, lock: Lock) -> None:
+    def __init__(self, sim: SimulatedM100, lock: Lock, ports: Ports) -> None:
         self._sim = sim
+        self._ports = ports
         self._lock = lock
         self._throttle = Throttle()
         self._publishers = {}
@@ -53,17 +55,11 @@ class DjiSdkServer:
             # Without activation dji_sdk's node stays up and offers nothing at all (1).
             rospy.logerr(f"activation refused (ack {ack}): no topic and no service of dji_sdk")
             return
-        self._services = (FlightServices(sim, lock), PayloadServices(sim))
+        self._services = (FlightServices(sim, lock, ports), PayloadServices(sim, ports))
         self._advertise()
         for suffix in FLAGS:
-            rospy.Subscriber(
-                f"dji_sdk/{TOPIC_PREFIX}{suffix}",
-                Joy,
-                self._on_setpoint,
-                callback_args=suffix,
-                queue_size=QUEUE,
-                tcp_nodelay=True,
-            )
+            name = f"dji_sdk/{TOPIC_PREFIX}{suffix}"
+            ports.subscriber(name, Joy, self._on_setpoint, suffix, QUEUE)
 
     def publish(self, stamp: rospy.Time, packets: Sequence[Packet]) -> None:
         """Publish packets with the stamp of their receipt."""
@@ -77,11 +73,11 @@ class DjiSdkServer:
 
     def _advertise(self) -> None:
         for topic, kind in TELEMETRY.items():
-            self._publishers[topic] = rospy.Publisher(
-                f"dji_sdk/{topic}", kind.type, queue_size=QUEUE, latch=topic == LATCHED
+            self._publishers[topic] = self._ports.publisher(
+                f"dji_sdk/{topic}", kind.type, QUEUE, latch=topic == LATCHED
             )
         self._silent = [
-            rospy.Publisher(f"dji_sdk/{topic}", message, queue_size=QUEUE)
+            self._ports.publisher(f"dji_sdk/{topic}", message, QUEUE)
             for topic, message in SILENT.items()
         ]
 

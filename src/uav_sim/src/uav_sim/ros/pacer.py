@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Steps of simulated time on the wall clock, without drift."""
+"""Steps of simulated time on the wall clock, without drift, at a speed that may change."""
 
 import time
 from typing import Callable
 
 # [s] of simulated time that is caught up in one burst; the rest stays lost, or subscribers would
-# see a clock
-# that runs ahead of the telemetry still in their sockets
+# see a clock that runs ahead of the telemetry still in their sockets
 MAX_LAG = 0.03
 
 
@@ -21,11 +20,17 @@ class Pacer:
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self.lost = 0.0  # [s] of wall time given up because the machine was too slow
-        self._period = step / speed_factor if speed_factor > 0.0 else 0.0
-        self._max_lag = MAX_LAG / speed_factor if speed_factor > 0.0 else 0.0
+        self._step = step
         self._clock = clock
         self._sleep = sleep
-        self._epoch = clock()
+        self.restart(speed_factor)
+
+    def restart(self, speed_factor: float) -> None:
+        """Count anew from now on, in simulated seconds per second; 0: as fast as possible."""
+        self.speed_factor = speed_factor
+        self._period = self._step / speed_factor if speed_factor > 0.0 else 0.0
+        self._max_lag = MAX_LAG / speed_factor if speed_factor > 0.0 else 0.0
+        self._epoch = self._clock()
         self._steps = 0
 
     def wait(self) -> None:

@@ -13,6 +13,7 @@ from geometry_msgs.msg import Vector3Stamped
 from dji_sdk import srv
 from dji_sdk.msg import Gimbal
 from uav_sim.m100 import SimulatedM100
+from uav_sim.ros.ports import Ports
 from uav_sim.ros.throttle import Throttle
 
 _NOT_IN_F, _NO_AUTHORITY, _NO_MISSION = 0xD0, 0xD1, 0xD3  # of the mission command set
@@ -34,11 +35,11 @@ _CAMERA = ("photo", "start of a video", "end of a video")
 class PayloadServices:
     """Services and gimbal topics that exist on the aircraft and move nothing here."""
 
-    def __init__(self, sim: SimulatedM100) -> None:
+    def __init__(self, sim: SimulatedM100, ports: Ports) -> None:
         self._sim = sim
         self._throttle = Throttle()
         for name, (service, cmd_id) in _ACKED.items():
-            rospy.Service(f"dji_sdk/{name}", service, self._acked(name, service, cmd_id))
+            ports.service(f"dji_sdk/{name}", service, self._acked(name, service, cmd_id))
         for name, service, handler in (
             ("mission_waypoint_getInfo", srv.MissionWpGetInfo, self._on_waypoint_info),
             ("mission_waypoint_getSpeed", srv.MissionWpGetSpeed, self._on_get_speed),
@@ -49,9 +50,9 @@ class PayloadServices:
             ("send_data_to_mobile", srv.SendMobileData, self._on_mobile_data),
             ("send_data_to_payload", srv.SendPayloadData, self._on_payload_data),
         ):
-            rospy.Service(f"dji_sdk/{name}", service, handler)
+            ports.service(f"dji_sdk/{name}", service, handler)
         for name, kind in (("gimbal_angle_cmd", Gimbal), ("gimbal_speed_cmd", Vector3Stamped)):
-            rospy.Subscriber(f"dji_sdk/{name}", kind, self._on_gimbal, name, queue_size=10)
+            ports.subscriber(f"dji_sdk/{name}", kind, self._on_gimbal, name)
 
     def _acked(self, name: str, service: Any, cmd_id: int) -> Any:
         is_upload = name.endswith("upload")

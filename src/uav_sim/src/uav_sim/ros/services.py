@@ -21,6 +21,7 @@ from dji_sdk.srv import (
     SetLocalPosRefResponse,
 )
 from uav_sim.m100 import SimulatedM100
+from uav_sim.ros.ports import Ports
 
 FIRMWARE = 0x03010A00  # 3.1.10.0, an M100's
 _AUTHORITY = {
@@ -38,7 +39,7 @@ _AUTHORITY = {
 class FlightServices:
     """Hands requests to the simulator, under its lock; a refusal is a reply, never an error."""
 
-    def __init__(self, sim: SimulatedM100, lock: Lock) -> None:
+    def __init__(self, sim: SimulatedM100, lock: Lock, ports: Ports) -> None:
         self._sim = sim
         self._lock = lock
         for name, service, handler in (
@@ -49,7 +50,7 @@ class FlightServices:
             ("activation", Activation, self._on_activation),
             ("query_drone_version", QueryDroneVersion, self._on_version),
         ):
-            rospy.Service(f"dji_sdk/{name}", service, handler)
+            ports.service(f"dji_sdk/{name}", service, handler)
 
     def _on_authority(self, request: Any) -> SDKControlAuthorityResponse:
         with self._lock:

@@ -40,6 +40,7 @@ from uav_sim.ros.conversions import (
 )
 from uav_sim.ros.dji_sdk_server import QUEUE, DjiSdkServer
 from uav_sim.ros.pacer import Pacer
+from uav_sim.ros.ports import Ports
 from uav_sim.world import World
 
 CLOCK_PERIOD, TRUTH_PERIOD, OBSTACLE_PERIOD = 0.005, 0.01, 0.1  # [s] of simulated time
@@ -73,7 +74,7 @@ class SimulatorNode:
         self._collision = rospy.Publisher("uav_sim/collision", String, queue_size=QUEUE, latch=True)
         if sim.world.obstacles:
             self._obstacles = rospy.Publisher("obstacles", ObstacleArray, queue_size=1)
-        self._server = DjiSdkServer(sim, self._lock)
+        self._server = DjiSdkServer(sim, self._lock, Ports())
 
     def run(self) -> None:
         """Simulate until ROS shuts down."""

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: MIT
+"""Whether simulated time passes: running, paused, or for a counted number of steps."""
+
+from threading import Condition
+
+
+class Gate:
+    """The simulating thread asks it before every step; any other thread may pause and step."""
+
+    def __init__(self, paused: bool = False) -> None:
+        self._change = Condition()
+        self._paused = paused
+        self._wanted = 0  # steps still to take while paused
+
+    @property
+    def paused(self) -> bool:
+        """Time stands still but for counted steps."""
+        return self._paused
+
+    def pause(self, paused: bool) -> None:
+        """Stop simulated time, or let it pass again."""
+        with self._change:
+            self._paused = paused
+            self._wanted = 0
+            self._change.notify_all()
+
+    def take(self, timeout: float) -> bool:
+        """Return whether a step may be taken, after at most a wall time [s]; for the simulator."""
+        with self._change:
+            if self._paused and self._wanted == 0:
+                self._change.wait(timeout)
+            return not self._paused or self._wanted > 0
+
+    def taken(self) -> None:
+        """Count a step that has been taken; for the simulator."""
+        if self._wanted:
+            with self._change:
+                self._wanted = max(0, self._wanted - 1)
+                self._change.notify_all()
+
+    def step(self, steps: int, timeout: float) -> bool:
+        """Have a number of steps taken while paused; return whether they were in a wall time [s]."""
+        with self._change:
+            if not self._paused:
+                return False
+            self._wanted += steps
+            self._change.notify_all()
+            return self._change.wait_for(lambda: self._wanted == 0, timeout) and self._paused
