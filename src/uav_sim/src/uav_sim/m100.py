@@ -5,13 +5,18 @@ import math
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from uav_sim.autopilot import Ack, Autopilot, Phase, Receipt
+from uav_sim.body import BodyState
+from uav_sim.disturbance import Disturbance
 from uav_sim.errors import SetpointError
 from uav_sim.faults.engine import NO_RESPONSE, Faults
+from uav_sim.link import Channel
 from uav_sim.plant import Plant, Vector
 from uav_sim.preset import PACKET_PERIOD, PlantPreset
 from uav_sim.remote_control import RemoteControl
 from uav_sim.setpoint import decode
 from uav_sim.telemetry import Packet, Telemetry, body_rates
+from uav_sim.vicon import Vicon, ViconPose
+from uav_sim.wind import Wind
 from uav_sim.world import Collision, World
 
 
@@ -31,9 +36,15 @@ class SimulatedM100:
     Begins on the ground at the world's origin with motors off and the RC in F. ``rc`` as well as
     ``wind``, ``thrust_gain`` and ``mass_factor`` of ``plant`` may be changed at any time;
     ``faults`` are begun and ended at any time or by schedule.
+    A disturbance draws from streams of its own and belongs to one aircraft.
     """
 
-    def __init__(self, preset: PlantPreset, world: Optional[World] = None) -> None:
+    def __init__(
+        self,
+        preset: PlantPreset,
+        world: Optional[World] = None,
+        disturbance: Optional[Disturbance] = None,
+    ) -> None:
         self.preset = preset
         self.t = 0.0  # [s]
         self.battery = 100.0  # [percent]
@@ -41,12 +52,19 @@ class SimulatedM100:
         self.plant = Plant(preset)
         self.autopilot = Autopilot(self.plant, self.rc)
         self.world = world or World((), preset.radius)
-        self.new_collisions: List[Collision] = []  # of the last step
+        self.disturbance = disturbance
+        self.new_poses: List[ViconPose] = []  # received in the last step
+        self.late_receipts: List[Receipt] = []  # of setpoints that arrived in the last step
         self.faults = Faults(self)
         self._telemetry = Telemetry(self.plant)
         self._steps = 0
         self._steps_per_packet = round(PACKET_PERIOD / preset.step)
         self._discharge = 100.0 * preset.step / preset.flight_time
+        self._wind: Optional[Wind] = None
+        self._commands: Optional[Channel] = None
+        self._vicon: Optional[Vicon] = None
+        if disturbance is not None:
+            self._disturb(disturbance)
 
     def place(
         self,
@@ -71,13 +89,20 @@ class SimulatedM100:
         """Advance by ``preset.step``; return the packets received in it, oldest first."""
         plant = self.plant
         self.faults.update(self.t)
+        if self._wind is not None:
+            plant.wind = self._wind.advance(plant.position[2], plant.velocity)
+        if self._commands is not None:
+            arrived = self._commands.receive(self.t)
+            self.late_receipts = [self.autopilot.setpoint(self.t, s) for s in arrived]
         self.autopilot.update(self.t)
         plant.step()
         self._steps += 1
         self.t = self._steps * self.preset.step
         if plant.motors_on:
             self.battery = max(0.0, self.battery - self._discharge)
-        self.new_collisions = self.world.observe(self.t, plant.position)
+        self.world.observe(self.t, plant.position)
+        if self._vicon is not None:
+            self.new_poses = self._vicon.poses(self.t, plant.position, plant.rpy)
         if self._steps % self._steps_per_packet == 0:
             self._telemetry.sample(
                 self.t,
@@ -102,6 +127,9 @@ class SimulatedM100:
             setpoint = decode(suffix, axes)
         except SetpointError as error:
             return Receipt(False, str(error))
+        if self._commands is not None:
+            self._commands.send(self.t, setpoint)
+            return Receipt(True)
         return self.autopilot.setpoint(self.t, setpoint)
 
     def control_authority(self, enable: bool) -> Ack:
@@ -134,9 +162,27 @@ class SimulatedM100:
         return Truth(self.t, plant.position, plant.velocity, rpy, body_rates(rpy, plant.rpy_rates))
 
     @property
+    def new_collisions(self) -> List[Collision]:
+        """Collisions that began in the last step."""
+        return self.world.new_collisions
+
+    @property
     def collisions(self) -> Tuple[Collision, ...]:
         """All collisions since the flight began."""
         return tuple(self.world.collisions)
+
+    @property
+    def sensed_obstacles(self) -> List[BodyState]:
+        """Obstacles as sensed from the aircraft: they share the slow error of its position."""
+        states, disturbance = self.world.states(), self.disturbance
+        if disturbance is None or not disturbance.shift:
+            return states
+        dx, dy, dz = disturbance.shift
+        return [
+            state._replace(position=(x + dx, y + dy, z + dz))
+            for state in states
+            for x, y, z in [state.position]
+        ]
 
     @property
     def clearance(self) -> Dict[str, float]:
@@ -146,3 +192,13 @@ class SimulatedM100:
     def _reply(self, cmd_set: int, cmd_id: int) -> Optional[Ack]:
         """Return the reply of a dead node: none; None if it lives."""
         return Ack(False, cmd_set, cmd_id, NO_RESPONSE) if self.faults.dead else None
+
+    def _disturb(self, disturbance: Disturbance) -> None:
+        self.plant.thrust_gain = disturbance.thrust_gain
+        self.plant.mass_factor = disturbance.mass_factor
+        self.autopilot.gps_health = disturbance.parameters.gps_health
+        self._telemetry.sensors = disturbance.sensors
+        self._telemetry.link = disturbance.telemetry
+        self._wind = disturbance.wind(self.preset.step)
+        self._commands = disturbance.command
+        self._vicon = disturbance.vicon

@@ -8,8 +8,10 @@ import math
 from collections import deque
 from typing import Any, Deque, List, NamedTuple, Optional, Tuple
 
+from uav_sim.link import TelemetryLink, insert
 from uav_sim.plant import Plant, Vector
 from uav_sim.preset import GeoPoint
+from uav_sim.sensors import Sample, Sensors
 
 EARTH_RADIUS = 6378137.0  # [m] of dji_sdk's flat-earth conversion (2.2)
 REFERENCE_GPS = 3  # set_local_pos_ref needs a gps_health above this (section 4)
@@ -99,6 +101,8 @@ class Telemetry:
 
     def __init__(self, plant: Plant) -> None:
         self.frame = LocalFrame(plant.preset.home)
+        self.sensors: Optional[Sensors] = None  # None: exact
+        self.link: Optional[TelemetryLink] = None  # None: nothing but the dead time
         self._plant = plant
         self._delay = plant.preset.delay.telemetry
         self._velocity_z_sign = plant.preset.flight_controller.undocumented.velocity_z_sign
@@ -143,18 +147,25 @@ class Telemetry:
         count, plant = self._count, self._plant
         self._count += 1
         rpy = plant.rpy
-        attitude = quaternion(*rpy)
         ax, ay, az = plant.acceleration
         force = to_body(rpy, (ax, ay, az + plant.preset.gravity))
         scale = self._scale
         acceleration = (scale * force[0], scale * force[1], scale * force[2])
-        imu = Imu(attitude, body_rates(rpy, plant.rpy_rates), acceleration)
+        rates, position, velocity = body_rates(rpy, plant.rpy_rates), plant.position, plant.velocity
+        if self.sensors is not None:
+            true = Sample(position, velocity, rpy, rates, acceleration, height)
+            measured = self.sensors.measure(true, count % _MEDIUM == 0)
+            position, velocity, rpy, rates, acceleration, height = measured
+        attitude = quaternion(*rpy)
+        imu = Imu(attitude, rates, acceleration)
         values: List[Tuple[str, Any]] = [("attitude", attitude), ("imu", imu)]
         if count % _MEDIUM == 0:
-            place = self.frame.to_earth(plant.position)
+            place = self.frame.to_earth(position)
+            if self.sensors is not None:
+                self.sensors.reported(place)
             values.insert(0, ("rc", rc))
             values += [("gps_health", gps_health), ("gps_position", place)]
-            vx, vy, vz = plant.velocity
+            vx, vy, vz = velocity
             velocity = (vx, vy, self._velocity_z_sign * vz)
             values += [("height_above_takeoff", height), ("velocity", velocity)]
         if count % _SLOW == 0:
@@ -164,7 +175,11 @@ class Telemetry:
             gimbal = (0.0, 0.0, math.remainder(heading, 360.0))
             values += [("flight_status", flight_status), ("gimbal_angle", gimbal)]
         received = t + self._delay
-        self._pending.extend(Packet(topic, received, value) for topic, value in values)
+        if self.link is None:
+            self._pending.extend(Packet(topic, received, value) for topic, value in values)
+            return
+        for arrival, topic, value in self.link.arrivals(received, values):
+            insert(self._pending, Packet(topic, arrival, value), when=1)
 
     def due(self, t: float) -> List[Packet]:
         """Return the packets received until ``t`` [s], oldest first."""
@@ -183,5 +198,7 @@ class Telemetry:
         return packets
 
     def _refer(self, t: float, place: GeoPoint) -> None:
+        if self.sensors is not None:
+            self.sensors.refer(place)
         self.frame.reference = place
         self._pending.appendleft(Packet("local_frame_ref", t, place))

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: MIT
+"""Errors of what the flight controller reports: position, velocity, attitude, height, IMU.
+
+Interface: ``Sensors(parameters, seed)``; ``measure(sample, medium)`` once per packet (100 Hz), with
+``medium`` when it carries the 50 Hz topics. ``drift`` is the slow error of the position now,
+``shared_shift`` that of ``local_position``, which obstacles sensed from the aircraft share.
+
+Each error is white noise plus a first-order Gauss-Markov process, begun as after a long time:
+sigma and correlation e^(-t / time_constant).
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from random import Random
+from typing import Any, Deque, NamedTuple, Tuple
+
+from uav_sim.motion import STILL, Vector
+
+_FAST, _MEDIUM = 0.01, 0.02  # [s] between samples of attitude and IMU, of the others
+_REMEMBERED = 100  # positions whose error is still known when one becomes the reference
+
+
+@dataclass(frozen=True)
+class ErrorParameters:
+    """Errors of one quantity, per axis, in its unit."""
+
+    white: float = field(metadata={"min": 0.0})  # sigma, independent from sample to sample
+    drift: float = field(metadata={"min": 0.0})  # sigma
+    time_constant: float = field(metadata={"min": 1e-3})  # [s] of the drift
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether there is none."""
+        return self.white == 0.0 and self.drift == 0.0
+
+
+@dataclass(frozen=True)
+class SensorParameters:
+    """Errors of all quantities."""
+
+    position: ErrorParameters = field()  # [m] of gps_position and local_position
+    velocity: ErrorParameters = field()  # [m/s]
+    attitude: ErrorParameters = field()  # [rad] of roll, pitch, yaw
+    gyroscope: ErrorParameters = field()  # [rad/s]
+    accelerometer: ErrorParameters = field()  # [m/s^2]
+    height: ErrorParameters = field()  # [m] of height_above_takeoff
+    height_offset: float = field(metadata={"min": 0.0})  # [m] sigma of the barometer's constant
+
+    @property
+    def is_perfect(self) -> bool:
+        """Whether no quantity has an error."""
+        errors = (self.position, self.velocity, self.attitude, self.gyroscope, self.accelerometer)
+        return self.height_offset == 0.0 and all(e.is_zero for e in (*errors, self.height))
+
+
+class Sample(NamedTuple):
+    """What is measured at one time: first true, then with errors."""
+
+    position: Vector  # [m] world
+    velocity: Vector  # [m/s] world
+    rpy: Vector  # [rad]
+    rates: Vector  # [rad/s] body FLU
+    acceleration: Vector  # [m/s^2] specific force, body FLU
+    height: float  # [m] above take-off
+
+
+class ErrorProcess:
+    """Errors (3,) of one quantity in time."""
+
+    def __init__(self, parameters: ErrorParameters, period: float, rng: Random) -> None:
+        self._white, sigma = parameters.white, parameters.drift
+        self._keep = math.exp(-period / parameters.time_constant)
+        self._add = sigma * math.sqrt(1.0 - self._keep * self._keep)
+        self._gauss = gauss = rng.gauss
+        self.drift: Vector = STILL
+        if sigma > 0.0:
+            self.drift = (gauss(0.0, sigma), gauss(0.0, sigma), gauss(0.0, sigma))
+
+    def advance(self) -> Vector:
+        """Go on by one period; return the error of the new sample."""
+        gauss, (x, y, z) = self._gauss, self.drift
+        if self._add > 0.0:
+            keep, add = self._keep, self._add
+            x = keep * x + gauss(0.0, add)
+            y = keep * y + gauss(0.0, add)
+            z = keep * z + gauss(0.0, add)
+            self.drift = (x, y, z)
+        white = self._white
+        if white > 0.0:
+            return (x + gauss(0.0, white), y + gauss(0.0, white), z + gauss(0.0, white))
+        return (x, y, z)
+
+
+class Sensors:
+    """All errors of one aircraft; each quantity draws from a random stream of its own."""
+
+    def __init__(self, parameters: SensorParameters, seed: str) -> None:
+        def process(name: str, period: float) -> ErrorProcess:
+            return ErrorProcess(getattr(parameters, name), period, Random(f"{seed}/{name}"))
+
+        self._position = process("position", _MEDIUM)
+        self._velocity = process("velocity", _MEDIUM)
+        self._height = process("height", _MEDIUM)
+        self._attitude = process("attitude", _FAST)
+        self._gyroscope = process("gyroscope", _FAST)
+        self._accelerometer = process("accelerometer", _FAST)
+        self.height_offset = Random(f"{seed}/height_offset").gauss(0.0, parameters.height_offset)
+        self._reported: Deque[Tuple[Any, Vector]] = deque(maxlen=_REMEMBERED)
+        self._error: Vector = STILL
+        self._reference_error: Vector = STILL
+
+    @property
+    def drift(self) -> Vector:
+        """Slow part (3,) [m] of the position's error now."""
+        return self._position.drift
+
+    @property
+    def shared_shift(self) -> Vector:
+        """Slow error (3,) [m] of ``local_position``: of its reference, too."""
+        (x, y, z), (rx, ry, rz) = self._position.drift, self._reference_error
+        return (x - rx, y - ry, z - rz)
+
+    def measure(self, sample: Sample, medium: bool) -> Sample:
+        """Return a sample with errors; position, velocity and height only where ``medium``."""
+        position, velocity, rpy, rates, acceleration, height = sample
+        rpy = _sum(rpy, self._attitude.advance())
+        rates = _sum(rates, self._gyroscope.advance())
+        acceleration = _sum(acceleration, self._accelerometer.advance())
+        if medium:
+            self._error = self._position.advance()
+            position = _sum(position, self._error)
+            velocity = _sum(velocity, self._velocity.advance())
+            height += self.height_offset + self._height.advance()[2]
+        return Sample(position, velocity, rpy, rates, acceleration, height)
+
+    def reported(self, place: Any) -> None:
+        """Remember the place on earth that the last measured position was reported as."""
+        self._reported.append((place, self._error))
+
+    def refer(self, place: Any) -> None:
+        """Take a place as the reference of ``local_position``; unless reported, it is exact."""
+        errors = [error for reported, error in self._reported if reported == place]
+        self._reference_error = errors[-1] if errors else STILL
+
+
+def _sum(a: Vector, b: Vector) -> Vector:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
