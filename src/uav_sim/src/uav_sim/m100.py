@@ -4,11 +4,14 @@
 import math
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
+import numpy as np
+
 from uav_sim.autopilot import Ack, Autopilot, Phase, Receipt
 from uav_sim.body import BodyState
 from uav_sim.disturbance import Disturbance
 from uav_sim.errors import SetpointError
 from uav_sim.faults.engine import NO_RESPONSE, Faults
+from uav_sim.laser import Laser
 from uav_sim.link import Channel
 from uav_sim.plant import Plant, Vector
 from uav_sim.preset import PACKET_PERIOD, PlantPreset
@@ -55,6 +58,8 @@ class SimulatedM100:
         self.disturbance = disturbance
         self.new_poses: List[ViconPose] = []  # received in the last step
         self.late_receipts: List[Receipt] = []  # of setpoints that arrived in the last step
+        self.laser: Optional[Laser] = None  # may be set before the first step
+        self.new_scan: Optional[np.ndarray] = None  # (n,) [m] taken in the last step
         self.faults = Faults(self)
         self._telemetry = Telemetry(self.plant)
         self._steps = 0
@@ -103,6 +108,8 @@ class SimulatedM100:
         self.world.observe(self.t, plant.position)
         if self._vicon is not None:
             self.new_poses = self._vicon.poses(self.t, plant.position, plant.rpy)
+        if self.laser is not None:
+            self._scan(self.laser)
         if self._steps % self._steps_per_packet == 0:
             self._telemetry.sample(
                 self.t,
@@ -192,6 +199,12 @@ class SimulatedM100:
     def _reply(self, cmd_set: int, cmd_id: int) -> Optional[Ack]:
         """Return the reply of a dead node: none; None if it lives."""
         return Ack(False, cmd_set, cmd_id, NO_RESPONSE) if self.faults.dead else None
+
+    def _scan(self, laser: Laser) -> None:
+        self.new_scan = None
+        if laser.due(self.t):
+            plant = self.plant
+            self.new_scan = laser.scan(plant.position, plant.rpy, self.world.states())
 
     def _disturb(self, disturbance: Disturbance) -> None:
         self.plant.thrust_gain = disturbance.thrust_gain
