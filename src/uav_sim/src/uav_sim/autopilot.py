@@ -42,6 +42,7 @@ class Autopilot:
         self._undocumented = self._settings.undocumented
         self.control = ControlAuthority(rc, self._undocumented)
         self._events: List[str] = []
+        self._modes: Optional[tuple] = None  # of the setpoint followed last
         self._loops = FlightLoops(plant)
         self._guidance = Guidance(plant, self._loops)
         self._auto = AutoFlight(plant, self._loops)
@@ -119,8 +120,9 @@ class Autopilot:
         setpoint, words = limited(setpoint, self._settings.limits, self._plant.preset.tilt_limit)
         if words and not self._settings.clamp:
             return Receipt(False, words)
-        if self._setpoint_time is None:
-            self._events.append(f"following setpoints: {setpoint.modes}")
+        if self._setpoint_time is None or setpoint.modes != self._modes:
+            self._modes = setpoint.modes
+            self._events.append(f"following setpoints: {setpoint.words}")
         self._guidance.accept(setpoint, self._has_position)
         self._setpoint_time = t
         return Receipt(True, words)

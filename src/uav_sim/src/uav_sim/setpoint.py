@@ -71,7 +71,12 @@ class Setpoint:
     yaw: float  # clockwise: angle from north [deg] or rate [deg/s]
 
     @property
-    def modes(self) -> str:
+    def modes(self) -> Tuple[Horizontal, Vertical, Yaw, Frame, bool]:
+        """The control byte in its parts."""
+        return self.horizontal, self.vertical, self.yaw_mode, self.frame, self.stable
+
+    @property
+    def words(self) -> str:
         """The control byte in words."""
         words = (
             f"horizontal {self.horizontal.name}",

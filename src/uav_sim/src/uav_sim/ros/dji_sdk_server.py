@@ -67,7 +67,7 @@ class DjiSdkServer:
             if topic in self._publishers:
                 self._publishers[topic].publish(TELEMETRY[topic].convert(stamp, value))
         for event in self._sim.autopilot.take_events():
-            rospy.logwarn(event)
+            self._warn(event)
         for line in self._throttle.overdue():
             rospy.logwarn(line)
 
@@ -86,6 +86,9 @@ class DjiSdkServer:
             receipt = self._sim.setpoint(suffix, message.axes)
         if receipt.text:
             became = "clamped" if receipt.accepted else "ignored"
-            line = self._throttle.line(f"setpoint {suffix} {became}: {receipt.text}")
-            if line:
-                rospy.logwarn(line)
+            self._warn(f"setpoint {suffix} {became}: {receipt.text}")
+
+    def _warn(self, text: str) -> None:
+        line = self._throttle.line(text)
+        if line:
+            rospy.logwarn(line)
