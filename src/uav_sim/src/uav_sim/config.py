@@ -42,17 +42,27 @@ def load_yaml(path: Source) -> Dict[str, Any]:
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
-        data = yaml.load(text, Loader=_NumberLoader)
     except OSError as error:
         raise ConfigError(str(path), "file", error.strerror, "a readable file") from None
     except UnicodeDecodeError:
         raise ConfigError(str(path), "file", "binary data", "YAML text") from None
+    return parse_yaml(text, str(path))
+
+
+def parse_yaml(text: str, source: str) -> Dict[str, Any]:
+    """Return the mapping in YAML text.
+
+    Raises:
+        ConfigError: it is no YAML, or holds no mapping.
+    """
+    try:
+        data = yaml.load(text, Loader=_NumberLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1}" if mark else "file"
-        raise ConfigError(str(path), where, getattr(error, "problem", ""), "valid YAML") from None
+        raise ConfigError(source, where, getattr(error, "problem", ""), "valid YAML") from None
     if not isinstance(data, dict):
-        raise ConfigError(str(path), "file", data, "a mapping of keys to values")
+        raise ConfigError(source, "file", data, "a mapping of keys to values")
     return data
 
 

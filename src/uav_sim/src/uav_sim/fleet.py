@@ -3,16 +3,20 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, Mapping, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
-from uav_sim.config import from_dict
+from uav_sim.config import from_dict, numbers
+from uav_sim.disturbance import Disturbance, load_disturbance
 from uav_sim.errors import ConfigError
 from uav_sim.faults.schedule import FaultLine
 from uav_sim.m100 import SimulatedM100
+from uav_sim.plant import Vector
 from uav_sim.preset import PACKET_PERIOD, load_preset
 from uav_sim.scene import Scene
 from uav_sim.telemetry import Packet
 from uav_sim.world import World
+
+ONLY = "aircraft"  # name of a vehicle that is alone
 
 
 @dataclass(frozen=True)
@@ -20,9 +24,21 @@ class VehicleEntry:
     """One vehicle of a fleet."""
 
     name: str  # also its namespace
-    preset: str = "dji_hil"  # plant preset
     spawn: Tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m] in the air: hovering, motors on
     yaw: float = field(default=0.0, metadata={"min": -math.pi, "max": math.pi})  # [rad]
+    preset: str = ""  # plant preset; empty: the fleet's
+    disturbance: str = ""  # level; empty: the fleet's
+
+
+@dataclass(frozen=True)
+class FleetSettings:
+    """What all vehicles share unless an entry says otherwise."""
+
+    preset: str = "dji_hil"
+    disturbance: str = "none"
+    seed: int = 0
+    changes: Optional[Dict[str, Any]] = None  # values that win over all presets
+    source: str = "changes"  # where these come from, for the words of an error
 
 
 class Fleet:
@@ -89,27 +105,40 @@ def load_vehicles(data: Any, source: str) -> Tuple[VehicleEntry, ...]:
     return tuple(entries)
 
 
-def make_fleet(entries: Sequence[VehicleEntry], scene: Scene, source: str) -> Fleet:
+def one_vehicle(spawn: Any, source: str) -> VehicleEntry:
+    """Return the only vehicle, at a place (3,) [m]; raises ConfigError."""
+    place: Vector = numbers(spawn, source, "spawn", 3)
+    if place[2] < 0.0:
+        raise ConfigError(source, "spawn[2]", place[2], "a height not below the ground")
+    return VehicleEntry(ONLY, place)
+
+
+def make_fleet(
+    entries: Sequence[VehicleEntry], settings: FleetSettings, scene: Scene, source: str
+) -> Fleet:
     """Return vehicles in their places, with the obstacles of a scene around them.
 
     Raises:
-        ConfigError: an unknown preset, presets with different steps, a name that an obstacle has,
-            or vehicles that touch each other.
+        ConfigError: an unknown preset or level, presets with different steps, a name that an
+            obstacle has, or vehicles that touch each other.
     """
     vehicles: Dict[str, SimulatedM100] = {}
     for i, entry in enumerate(entries):
-        key, preset = f"vehicles[{i}]", load_preset(entry.preset)
+        key, preset_name = f"vehicles[{i}]", entry.preset or settings.preset
+        preset = load_preset(preset_name, settings.changes, settings.source)
         for other, vehicle in zip(entries, vehicles.values()):
             gap = math.dist(entry.spawn, other.spawn) - preset.radius - vehicle.preset.radius
             if gap <= 0.0:
                 raise ConfigError(source, f"{key}.spawn", entry.spawn, f"a place off {other.name}")
             if preset.step != vehicle.preset.step:
-                step = f"a preset with step {vehicle.preset.step:g}"
-                raise ConfigError(source, f"{key}.preset", entry.preset, step)
+                expected = f"a preset with step {vehicle.preset.step:g} s"
+                raise ConfigError(source, f"{key}.preset", preset_name, expected)
         if entry.name in [obstacle.id for obstacle in scene.obstacles]:
             raise ConfigError(source, f"{key}.name", entry.name, "a name that no obstacle has")
+        level = load_disturbance(entry.disturbance or settings.disturbance)
+        disturbance = Disturbance(level, settings.seed, entry.name)
         world = World(scene, preset.radius, entry.name)
-        vehicles[entry.name] = SimulatedM100(preset, world)
+        vehicles[entry.name] = SimulatedM100(preset, world, disturbance)
     for entry in entries:
         airborne = entry.spawn[2] > 0.0
         vehicles[entry.name].place(entry.spawn, yaw=entry.yaw, airborne=airborne)

@@ -7,6 +7,7 @@ from typing import List
 
 from uav_sim.authority import OBTAINING
 from uav_sim.faults.base import Aircraft, Context, Fault
+from uav_sim.faults.topics import SURROUNDINGS
 from uav_sim.telemetry import Packet
 
 _STICK = {"min": -1.0, "max": 1.0}
@@ -122,8 +123,8 @@ class NodeKilled(Fault):
     what: str = field(default="process", metadata={"choices": ("process", "driver")})
 
     def filter(self, t: float, packets: List[Packet]) -> List[Packet]:
-        """Send nothing any more."""
-        return []
+        """Send nothing any more; what others publish goes on."""
+        return [packet for packet in packets if packet.topic in SURROUNDINGS]
 
     def objection(self, suffix: str) -> str:
         """Take no setpoint any more."""

@@ -6,7 +6,7 @@ import logging
 import math
 import random
 from dataclasses import dataclass
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
 from uav_sim.config import number
 from uav_sim.errors import ConfigError
@@ -69,19 +69,29 @@ class Faults:
         kind: str,
         start: Optional[float] = None,
         duration: float = math.inf,
+        **parameters: Any,
+    ) -> str:
+        """Begin a fault now or later; as ``inject``, with the parameters as keywords."""
+        return self.inject(kind, parameters, start, duration)
+
+    def inject(
+        self,
+        kind: str,
+        parameters: Mapping[str, Any],
+        start: Optional[float] = None,
+        duration: float = math.inf,
         id: str = "",
         source: str = "fault",
-        **parameters: Any,
     ) -> str:
         """Begin a fault now or later; returns the id by which it can be cleared.
 
         Args:
             kind: one of ``kinds.KINDS``.
+            parameters: values of the kind's parameters; those that are missing have defaults.
             start: simulated time [s] of its begin; None or in the past: now.
             duration: [s]; infinite: until it is cleared.
             id: by default its kind and a number.
             source: where this comes from, for the words of an error.
-            parameters: of the kind.
 
         Raises:
             ConfigError: a kind, parameter, time or id that is wrong.

@@ -27,8 +27,8 @@ class FaultLine:
 
     def apply(self, faults: Faults) -> str:
         """Schedule this fault; returns its id. Raises ConfigError if the id is in use."""
-        return faults.apply(
-            self.kind, self.start, self.duration, self.id, self.source, **self.parameters
+        return faults.inject(
+            self.kind, self.parameters, self.start, self.duration, self.id, self.source
         )
 
 

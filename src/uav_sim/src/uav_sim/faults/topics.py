@@ -74,8 +74,10 @@ class TopicFault(Fault):
     topic: str = field(metadata={"choices": TOPICS})
 
     def concerns(self, packet: Packet) -> bool:
-        """Return whether this fault acts on a packet."""
-        return self.topic in (packet.topic, ALL)
+        """Return whether this fault acts on a packet; all topics are those of ``dji_sdk``."""
+        if self.topic == ALL:
+            return packet.topic not in SURROUNDINGS
+        return packet.topic == self.topic
 
 
 @dataclass

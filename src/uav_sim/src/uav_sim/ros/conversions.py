@@ -10,6 +10,8 @@ from geometry_msgs.msg import (
     PointStamped,
     Quaternion,
     QuaternionStamped,
+    Transform,
+    TransformStamped,
     Vector3,
     Vector3Stamped,
 )
@@ -22,6 +24,7 @@ from nmpc_msgs.msg import ObstacleArray
 from uav_sim.body import BodyState
 from uav_sim.m100 import Truth
 from uav_sim.telemetry import quaternion, to_body
+from uav_sim.vicon import ViconPose
 from uav_sim.world import Collision
 
 _SHAPES = {"sphere": ObstacleMsg.SPHERE, "cylinder": ObstacleMsg.CYLINDER, "box": ObstacleMsg.BOX}
@@ -135,6 +138,14 @@ def obstacles_to_msg(
                 velocity=Vector3(*velocity),
             )
         )
+    return message
+
+
+def pose_to_transform(pose: ViconPose, frame_id: str, child_frame_id: str) -> TransformStamped:
+    """Return a captured pose, stamped with the time of capture, as vicon_bridge does."""
+    message = TransformStamped(Header(0, to_time(pose.t), frame_id), child_frame_id, Transform())
+    message.transform.translation = Vector3(*pose.position)
+    message.transform.rotation = Quaternion(*pose.orientation)
     return message
 
 

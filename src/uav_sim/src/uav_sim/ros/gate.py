@@ -39,7 +39,7 @@ class Gate:
                 self._change.notify_all()
 
     def step(self, steps: int, timeout: float) -> bool:
-        """Have a number of steps taken while paused; return whether they were in a wall time [s]."""
+        """Have steps taken while paused; return whether they were within a wall time [s]."""
         with self._change:
             if not self._paused:
                 return False

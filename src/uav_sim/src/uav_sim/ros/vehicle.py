@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""One vehicle of the simulator as ROS sees it: dji_sdk, surroundings, ground truth, faults.
+
+Publishers beside those of dji_sdk, below the vehicle's namespace:
+    uav_sim/ground_truth (nav_msgs/Odometry): true state at 100 Hz, twist in ``base_link`` axes.
+    uav_sim/obstacles (nmpc_msgs/ObstacleArray): true obstacles at 10 Hz, where there are any.
+    uav_sim/collision (std_msgs/String): one line per contact of the hull; latched.
+    uav_sim/faults (nmpc_msgs/FaultArray): active faults; latched.
+    obstacles (nmpc_msgs/ObstacleArray): as sensed, at 10 Hz, where there are any.
+    /tf: world to ``vicon_frame``, where the level of disturbance has motion capture.
+"""
+
+from threading import Lock
+from typing import Callable, Dict, List, Sequence
+
+import rospy
+from nav_msgs.msg import Odometry
+from std_msgs.msg import String
+from tf2_ros import TransformBroadcaster
+
+from nmpc_msgs.msg import ObstacleArray
+from uav_sim.m100 import SimulatedM100
+from uav_sim.ros.conversions import (
+    collision_to_msg,
+    obstacles_to_msg,
+    pose_to_transform,
+    truth_to_odometry,
+)
+from uav_sim.ros.dji_sdk_server import QUEUE, DjiSdkServer
+from uav_sim.ros.faults import FaultServices
+from uav_sim.ros.ports import Ports
+from uav_sim.telemetry import Packet
+
+TRUTH_PERIOD, OBSTACLE_PERIOD = 0.01, 0.1  # [s] of simulated time
+
+
+class Vehicle:
+    """Publishes what comes out of a simulated aircraft, step by step."""
+
+    def __init__(
+        self,
+        sim: SimulatedM100,
+        lock: Lock,
+        namespace: str,
+        frame_id: str,
+        vicon_frame: str,
+    ) -> None:
+        self._sim = sim
+        self._frame_id = frame_id
+        self._prefix = f"{namespace}: " if namespace else ""
+        ports = Ports(namespace)
+        self._vicon_frame = ports.name(vicon_frame)
+        step = sim.preset.step
+        self._truth_steps = round(TRUTH_PERIOD / step)
+        self._obstacle_steps = round(OBSTACLE_PERIOD / step)
+        self._steps = 0
+        self._phase = sim.phase
+        self._truth = ports.publisher("uav_sim/ground_truth", Odometry, QUEUE)
+        self._collision = ports.publisher("uav_sim/collision", String, QUEUE, latch=True)
+        self._has_obstacles = bool(sim.world.scene.bodies(sim.world.name))
+        if self._has_obstacles:
+            self._true_obstacles = ports.publisher("uav_sim/obstacles", ObstacleArray, 1)
+            self._obstacles = ports.publisher("obstacles", ObstacleArray, 1)
+        self._transforms = TransformBroadcaster()
+        self._publish: Dict[str, Callable[[rospy.Time, Packet], None]] = {
+            "obstacles": self._publish_obstacles,
+            "vicon": self._publish_pose,
+        }
+        self._driver_ports = Ports(namespace)
+        self._driver = DjiSdkServer(sim, lock, self._driver_ports)
+        self._driver_is_dead = False
+        self._faults = FaultServices(sim, lock, ports)
+
+    def surroundings(self) -> List[Packet]:
+        """Return what others than dji_sdk report of this step, faults applied; call it locked."""
+        sim = self._sim
+        self._steps += 1
+        packets = [Packet("vicon", sim.t, pose) for pose in sim.new_poses]
+        if self._has_obstacles and self._steps % self._obstacle_steps == 0:
+            packets.append(Packet("obstacles", sim.t, sim.sensed_obstacles))
+        return sim.faults.filter(sim.t, packets)
+
+    def publish(self, stamp: rospy.Time, packets: Sequence[Packet]) -> None:
+        """Publish a step's packets, and what else is due after it."""
+        sim = self._sim
+        self.report()
+        self._driver.publish(stamp, [p for p in packets if p.topic not in self._publish])
+        for packet in packets:
+            if packet.topic in self._publish:
+                self._publish[packet.topic](stamp, packet)
+        if self._steps % self._truth_steps == 0:
+            self._truth.publish(truth_to_odometry(stamp, sim.truth, self._frame_id))
+        if self._has_obstacles and self._steps % self._obstacle_steps == 0:
+            states = obstacles_to_msg(stamp, sim.world.states(), self._frame_id)
+            self._true_obstacles.publish(states)
+        for collision in sim.new_collisions:
+            message = collision_to_msg(collision)
+            self._collision.publish(message)
+            rospy.logerr(f"{self._prefix}collision: {message.data}")
+        if sim.phase is not self._phase:
+            self._phase = sim.phase
+            rospy.loginfo(f"{self._prefix}the aircraft is {sim.phase.value}, t = {sim.t:.2f} s")
+
+    def report(self) -> None:
+        """Show faults that have begun or ended; end the driver if that is one of them."""
+        self._faults.report()
+        if self._sim.faults.dead == "driver" and not self._driver_is_dead:
+            self._driver_is_dead = True
+            self._driver_ports.close()
+            rospy.logerr(f"{self._prefix}dji_sdk is dead: no topic and no service any more")
+
+    def _publish_obstacles(self, stamp: rospy.Time, packet: Packet) -> None:
+        self._obstacles.publish(obstacles_to_msg(stamp, packet.value, self._frame_id))
+
+    def _publish_pose(self, stamp: rospy.Time, packet: Packet) -> None:
+        transform = pose_to_transform(packet.value, self._frame_id, self._vicon_frame)
+        self._transforms.sendTransform(transform)
