@@ -60,7 +60,8 @@ class SimulatedM100:
         self.late_receipts: List[Receipt] = []  # of setpoints that arrived in the last step
         self.laser: Optional[Laser] = None  # may be set before the first step
         self.new_scan: Optional[np.ndarray] = None  # (n,) [m] taken in the last step
-        self.faults = Faults(self)
+        seed = disturbance.seed if disturbance is not None else 0
+        self.faults = Faults(self, f"{seed}/{self.world.name}")
         self._telemetry = Telemetry(self.plant)
         self._steps = 0
         self._steps_per_packet = round(PACKET_PERIOD / preset.step)

@@ -44,7 +44,7 @@ class Faults:
     ``on_change`` is called with a line of text whenever a fault begins or ends.
     """
 
-    def __init__(self, aircraft: Aircraft, seed: int = 0) -> None:
+    def __init__(self, aircraft: Aircraft, seed: str = "0") -> None:
         self.on_change: Callable[[str], None] = logging.getLogger(__name__).warning
         self._aircraft = aircraft
         self._seed = seed
@@ -153,7 +153,7 @@ class Faults:
         return next((entry.fault.kills for entry in self._active if entry.fault.kills), "")
 
     def _begin(self, entry: Entry) -> None:
-        seeded = random.Random(f"{self._seed}:{entry.id}")
+        seeded = random.Random(f"{self._seed}/{entry.id}")
         self._active.append(entry)
         context = Context(self._aircraft, self._overrides, seeded, entry.since, entry.until)
         entry.fault.begin(context)
