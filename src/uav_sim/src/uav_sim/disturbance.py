@@ -91,7 +91,7 @@ class Disturbance:
     def wind(self, step: float) -> Optional[Wind]:
         """Return the wind for a plant with steps of ``step`` [s]."""
         p = self.parameters.wind
-        return None if p.is_calm else Wind(p, Random(f"{self.seed}/wind"), step)
+        return None if p.is_calm else Wind(p, f"{self.seed}/wind", step)
 
     def stream(self, concern: str) -> Random:
         """Return the random stream of a concern, from its beginning."""

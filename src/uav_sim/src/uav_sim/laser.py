@@ -12,7 +12,6 @@ taken at one instant. As in REP 117, inf: nothing within range; -inf: nearer tha
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from random import Random
 from typing import List, Sequence, Tuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from uav_sim.body import BodyState
 from uav_sim.config import config_directory, from_dict, load_yaml
 from uav_sim.errors import ConfigError
 from uav_sim.motion import Vector
+from uav_sim.noise import generator
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Laser:
         self.angles = p.angle_min + p.angle_increment * np.arange(count)  # (n,) [rad]
         plane = np.stack([np.cos(self.angles), np.sin(self.angles), np.zeros(count)])
         self._beams = rotation(p.mount_rpy) @ plane  # (3, n) in body axes
-        self._noise = np.random.default_rng(Random(f"{seed}/laser").getrandbits(64))
+        self._noise = generator(f"{seed}/laser")
         self._scans = 0
 
     def due(self, t: float) -> bool:

@@ -12,10 +12,10 @@ sigma and correlation e^(-t / time_constant).
 import math
 from collections import deque
 from dataclasses import dataclass, field
-from random import Random
 from typing import Any, Deque, NamedTuple, Tuple
 
 from uav_sim.motion import STILL, Vector
+from uav_sim.noise import normals
 
 _FAST, _MEDIUM = 0.01, 0.02  # [s] between samples of attitude and IMU, of the others
 _REMEMBERED = 100  # positions whose error is still known when one becomes the reference
@@ -68,27 +68,25 @@ class Sample(NamedTuple):
 class ErrorProcess:
     """Errors (3,) of one quantity in time."""
 
-    def __init__(self, parameters: ErrorParameters, period: float, rng: Random) -> None:
+    def __init__(self, parameters: ErrorParameters, period: float, seed: str) -> None:
         self._white, sigma = parameters.white, parameters.drift
         self._keep = math.exp(-period / parameters.time_constant)
         self._add = sigma * math.sqrt(1.0 - self._keep * self._keep)
-        self._gauss = gauss = rng.gauss
+        self._draw = draw = normals(seed)
         self.drift: Vector = STILL
         if sigma > 0.0:
-            self.drift = (gauss(0.0, sigma), gauss(0.0, sigma), gauss(0.0, sigma))
+            self.drift = (sigma * draw(), sigma * draw(), sigma * draw())
 
     def advance(self) -> Vector:
         """Go on by one period; return the error of the new sample."""
-        gauss, (x, y, z) = self._gauss, self.drift
+        draw, (x, y, z) = self._draw, self.drift
         if self._add > 0.0:
             keep, add = self._keep, self._add
-            x = keep * x + gauss(0.0, add)
-            y = keep * y + gauss(0.0, add)
-            z = keep * z + gauss(0.0, add)
+            x, y, z = keep * x + add * draw(), keep * y + add * draw(), keep * z + add * draw()
             self.drift = (x, y, z)
         white = self._white
         if white > 0.0:
-            return (x + gauss(0.0, white), y + gauss(0.0, white), z + gauss(0.0, white))
+            return (x + white * draw(), y + white * draw(), z + white * draw())
         return (x, y, z)
 
 
@@ -97,7 +95,7 @@ class Sensors:
 
     def __init__(self, parameters: SensorParameters, seed: str) -> None:
         def process(name: str, period: float) -> ErrorProcess:
-            return ErrorProcess(getattr(parameters, name), period, Random(f"{seed}/{name}"))
+            return ErrorProcess(getattr(parameters, name), period, f"{seed}/{name}")
 
         self._position = process("position", _MEDIUM)
         self._velocity = process("velocity", _MEDIUM)
@@ -105,7 +103,7 @@ class Sensors:
         self._attitude = process("attitude", _FAST)
         self._gyroscope = process("gyroscope", _FAST)
         self._accelerometer = process("accelerometer", _FAST)
-        self.height_offset = Random(f"{seed}/height_offset").gauss(0.0, parameters.height_offset)
+        self.height_offset = parameters.height_offset * normals(f"{seed}/height_offset")()
         self._reported: Deque[Tuple[Any, Vector]] = deque(maxlen=_REMEMBERED)
         self._error: Vector = STILL
         self._reference_error: Vector = STILL

@@ -12,6 +12,7 @@ from typing import List, NamedTuple, Tuple
 
 from uav_sim.link import Channel, LinkParameters
 from uav_sim.motion import Vector
+from uav_sim.noise import normals
 from uav_sim.telemetry import quaternion
 
 
@@ -41,7 +42,7 @@ class Vicon:
 
     def __init__(self, parameters: ViconParameters, seed: str) -> None:
         self.parameters = parameters
-        self._noise = Random(f"{seed}/noise")
+        self._draw = normals(f"{seed}/noise")
         self._gaps = Random(f"{seed}/dropout")
         self._channel = Channel(parameters.link, Random(f"{seed}/link"))
         self._frames = 0
@@ -65,9 +66,9 @@ class Vicon:
         return self._channel.receive(t)
 
     def _pose(self, t: float, position: Vector, rpy: Vector) -> ViconPose:
-        gauss, p = self._noise.gauss, self.parameters
-        x, y, z = (v + gauss(0.0, p.position) for v in position)
-        roll, pitch, yaw = (v + gauss(0.0, p.attitude) for v in rpy)
+        draw, p = self._draw, self.parameters
+        x, y, z = (v + p.position * draw() for v in position)
+        roll, pitch, yaw = (v + p.attitude * draw() for v in rpy)
         return ViconPose(t, (x, y, z), quaternion(roll, pitch, yaw))
 
     def _next_gap(self, after: float) -> None:

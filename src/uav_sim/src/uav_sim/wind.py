@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Wind: a constant mean and Dryden gusts of low altitude.
 
-Interface: ``Wind(parameters, rng, step)``; ``advance(height, velocity)`` once per plant step
+Interface: ``Wind(parameters, seed, step)``; ``advance(height, velocity)`` once per plant step
 returns the air's velocity (3,) [m/s] in the world frame; ``mean`` is its constant part.
 
 Spectra, scale lengths and intensities of MIL-F-8785C, section 3.7 (below 1000 ft); those of
@@ -13,6 +13,8 @@ import math
 from dataclasses import dataclass, field
 from random import Random
 from typing import Tuple, Union
+
+from uav_sim.noise import normals
 
 Vector = Tuple[float, float, float]
 
@@ -74,13 +76,13 @@ def intensities(gusts: Union[GustLevel, GustSigma], height: float) -> Tuple[floa
 class Wind:
     """The air's velocity at the aircraft; u lies along the mean wind, v to its left, w up."""
 
-    def __init__(self, parameters: WindParameters, rng: Random, step: float) -> None:
+    def __init__(self, parameters: WindParameters, seed: str, step: float) -> None:
         self.parameters = p = parameters
         spread = p.direction_spread
-        direction = p.direction + rng.uniform(-spread, spread)
+        direction = p.direction + Random(seed).uniform(-spread, spread)
         self._cos, self._sin = math.cos(direction), math.sin(direction)
         self.mean: Vector = (p.speed * self._cos, p.speed * self._sin, 0.0)  # [m/s]
-        self._gauss = rng.gauss
+        self._draw = normals(seed)
         self._steps = max(1, round(p.period / step))
         self._period = self._steps * step
         self._count = 0
@@ -89,8 +91,7 @@ class Wind:
         # Normalised filter states, begun as after a long time: u of unit variance, and for v and w
         # a pair (p, q) with p' = -p / T + noise and q' = (p - q) / T, so that the variance of q and
         # the covariance are 1/2.
-        gauss = self._gauss
-        self._u = gauss(0.0, 1.0)
+        self._u = self._draw()
         self._v, self._w = self._pair(), self._pair()
 
     def advance(self, height: float, velocity: Vector) -> Vector:
@@ -114,7 +115,7 @@ class Wind:
         rate = airspeed * self._period / p.length_factor
         horizontal, vertical = intensities(p.gusts, height)
         decay = math.exp(-rate / along)
-        self._u = decay * self._u + math.sqrt(1.0 - decay * decay) * self._gauss(0.0, 1.0)
+        self._u = decay * self._u + math.sqrt(1.0 - decay * decay) * self._draw()
         self._v = self._filtered(self._v, rate / along)
         self._w = self._filtered(self._w, rate / up)
         u = horizontal * self._u
@@ -126,8 +127,8 @@ class Wind:
         )
 
     def _pair(self) -> Tuple[float, float]:
-        p = self._gauss(0.0, 1.0)
-        return p, 0.5 * p + 0.5 * self._gauss(0.0, 1.0)
+        p = self._draw()
+        return p, 0.5 * p + 0.5 * self._draw()
 
     def _filtered(self, pair: Tuple[float, float], r: float) -> Tuple[float, float]:
         """Return (p, q) after ``r`` time constants; the noise keeps their covariance."""
@@ -138,8 +139,7 @@ class Wind:
         qq = 0.5 - a2 * (r * r + r + 0.5)
         root = math.sqrt(pp)
         rest = math.sqrt(max(qq - pq * pq / pp, 0.0))
-        gauss = self._gauss
-        n1, n2 = gauss(0.0, 1.0), gauss(0.0, 1.0)
+        n1, n2 = self._draw(), self._draw()
         return a * p + root * n1, a * q + b * p + pq / root * n1 + rest * n2
 
 
