@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Errors of what the flight controller reports: position, velocity, attitude, height, IMU.
 
-Interface: ``Sensors(parameters, seed)``; ``measure(sample, medium)`` once per packet (100 Hz), with
-``medium`` when it carries the 50 Hz topics. ``drift`` is the slow error of the position now,
-``shared_shift`` that of ``local_position``, which obstacles sensed from the aircraft share.
+Interface: ``Sensors(parameters, seed)``; ``inertial`` once per packet (100 Hz), ``navigation`` once
+per packet with the 50 Hz topics. ``drift`` is the slow error of the position now, ``shared_shift``
+that of ``local_position``, which obstacles sensed from the aircraft share.
 
 Each error is white noise plus a first-order Gauss-Markov process, begun as after a long time:
 sigma and correlation e^(-t / time_constant).
@@ -12,7 +12,7 @@ sigma and correlation e^(-t / time_constant).
 import math
 from collections import deque
 from dataclasses import dataclass, field
-from typing import Any, Deque, NamedTuple, Tuple
+from typing import Any, Deque, Tuple
 
 from uav_sim.motion import STILL, Vector
 from uav_sim.noise import normals
@@ -54,17 +54,6 @@ class SensorParameters:
         return self.height_offset == 0.0 and all(e.is_zero for e in (*errors, self.height))
 
 
-class Sample(NamedTuple):
-    """What is measured at one time: first true, then with errors."""
-
-    position: Vector  # [m] world
-    velocity: Vector  # [m/s] world
-    rpy: Vector  # [rad]
-    rates: Vector  # [rad/s] body FLU
-    acceleration: Vector  # [m/s^2] specific force, body FLU
-    height: float  # [m] above take-off
-
-
 class ErrorProcess:
     """Errors (3,) of one quantity in time."""
 
@@ -77,17 +66,17 @@ class ErrorProcess:
         if sigma > 0.0:
             self.drift = (sigma * draw(), sigma * draw(), sigma * draw())
 
-    def advance(self) -> Vector:
-        """Go on by one period; return the error of the new sample."""
-        draw, (x, y, z) = self._draw, self.drift
+    def added(self, value: Vector) -> Vector:
+        """Go on by one period; return a true value (3,) with the error of the new sample."""
+        draw, (a, b, c), (x, y, z) = self._draw, value, self.drift
         if self._add > 0.0:
             keep, add = self._keep, self._add
             x, y, z = keep * x + add * draw(), keep * y + add * draw(), keep * z + add * draw()
             self.drift = (x, y, z)
         white = self._white
         if white > 0.0:
-            return (x + white * draw(), y + white * draw(), z + white * draw())
-        return (x, y, z)
+            return (a + x + white * draw(), b + y + white * draw(), c + z + white * draw())
+        return (a + x, b + y, c + z)
 
 
 class Sensors:
@@ -119,18 +108,24 @@ class Sensors:
         (x, y, z), (rx, ry, rz) = self._position.drift, self._reference_error
         return (x - rx, y - ry, z - rz)
 
-    def measure(self, sample: Sample, medium: bool) -> Sample:
-        """Return a sample with errors; position, velocity and height only where ``medium``."""
-        position, velocity, rpy, rates, acceleration, height = sample
-        rpy = _sum(rpy, self._attitude.advance())
-        rates = _sum(rates, self._gyroscope.advance())
-        acceleration = _sum(acceleration, self._accelerometer.advance())
-        if medium:
-            self._error = self._position.advance()
-            position = _sum(position, self._error)
-            velocity = _sum(velocity, self._velocity.advance())
-            height += self.height_offset + self._height.advance()[2]
-        return Sample(position, velocity, rpy, rates, acceleration, height)
+    def inertial(
+        self, rpy: Vector, rates: Vector, acceleration: Vector
+    ) -> Tuple[Vector, Vector, Vector]:
+        """Return roll, pitch, yaw [rad], body rates [rad/s], specific force [m/s^2] with errors."""
+        return (
+            self._attitude.added(rpy),
+            self._gyroscope.added(rates),
+            self._accelerometer.added(acceleration),
+        )
+
+    def navigation(
+        self, position: Vector, velocity: Vector, height: float
+    ) -> Tuple[Vector, Vector, float]:
+        """Return position [m], velocity [m/s], height above take-off [m] with errors."""
+        self._error = self._position.added(STILL)
+        (x, y, z), (ex, ey, ez) = position, self._error
+        height += self.height_offset + self._height.added(STILL)[2]
+        return (x + ex, y + ey, z + ez), self._velocity.added(velocity), height
 
     def reported(self, place: Any) -> None:
         """Remember the place on earth that the last measured position was reported as."""
@@ -140,7 +135,3 @@ class Sensors:
         """Take a place as the reference of ``local_position``; unless reported, it is exact."""
         errors = [error for reported, error in self._reported if reported == place]
         self._reference_error = errors[-1] if errors else STILL
-
-
-def _sum(a: Vector, b: Vector) -> Vector:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

@@ -11,7 +11,7 @@ from typing import Any, Deque, List, NamedTuple, Optional, Tuple
 from uav_sim.link import TelemetryLink, insert
 from uav_sim.plant import Plant, Vector
 from uav_sim.preset import GeoPoint
-from uav_sim.sensors import Sample, Sensors
+from uav_sim.sensors import Sensors
 
 EARTH_RADIUS = 6378137.0  # [m] of dji_sdk's flat-earth conversion (2.2)
 REFERENCE_GPS = 3  # set_local_pos_ref needs a gps_health above this (section 4)
@@ -151,18 +151,19 @@ class Telemetry:
         force = to_body(rpy, (ax, ay, az + plant.preset.gravity))
         scale = self._scale
         acceleration = (scale * force[0], scale * force[1], scale * force[2])
-        rates, position, velocity = body_rates(rpy, plant.rpy_rates), plant.position, plant.velocity
-        if self.sensors is not None:
-            true = Sample(position, velocity, rpy, rates, acceleration, height)
-            measured = self.sensors.measure(true, count % _MEDIUM == 0)
-            position, velocity, rpy, rates, acceleration, height = measured
+        rates, sensors = body_rates(rpy, plant.rpy_rates), self.sensors
+        if sensors is not None:
+            rpy, rates, acceleration = sensors.inertial(rpy, rates, acceleration)
         attitude = quaternion(*rpy)
         imu = Imu(attitude, rates, acceleration)
         values: List[Tuple[str, Any]] = [("attitude", attitude), ("imu", imu)]
         if count % _MEDIUM == 0:
+            position, velocity = plant.position, plant.velocity
+            if sensors is not None:
+                position, velocity, height = sensors.navigation(position, velocity, height)
             place = self.frame.to_earth(position)
-            if self.sensors is not None:
-                self.sensors.reported(place)
+            if sensors is not None:
+                sensors.reported(place)
             values.insert(0, ("rc", rc))
             values += [("gps_health", gps_health), ("gps_position", place)]
             vx, vy, vz = velocity
