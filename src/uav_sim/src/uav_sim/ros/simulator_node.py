@@ -7,6 +7,7 @@ ROS parameters (private):
     scenario_file: YAML of which only ``obstacles`` and ``spawn`` are read; empty: neither.
         ``spawn`` is where the aircraft stands; with z > 0 it begins there hovering with motors on.
     disturbance: level, a file in ``config/disturbances``, or a path.
+    laser: scanner, a file in ``config/lasers``, or a path; empty: none.
     seed: of all that is random.
     fault_file: YAML of faults, each with its time; empty: none.
     vehicles: several vehicles in namespaces, a list of mappings with name, spawn, and where they
@@ -95,7 +96,10 @@ class SimulatorNode:
 
 def main() -> None:
     """Entry point; exit status 2 on a wrong parameter or file."""
-    rospy.init_node("uav_sim")
+    # rospy's own handler would join threads that wait for the lock which the main thread holds.
+    rospy.init_node("uav_sim", disable_signals=True)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     try:
         settings = read_settings()
         fleet, namespaces = read_fleet()
@@ -110,4 +114,9 @@ def main() -> None:
             f"{vehicle}: {sim.preset.name}, {len(sim.world.obstacles)} obstacles, "
             f"speed factor {settings.speed_factor:g}"
         )
-    SimulatorNode(fleet, settings, namespaces).run()
+    try:
+        SimulatorNode(fleet, settings, namespaces).run()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        rospy.signal_shutdown("the simulator has ended")
