@@ -9,6 +9,7 @@ from uav_sim.config import from_dict, numbers
 from uav_sim.disturbance import Disturbance, load_disturbance
 from uav_sim.errors import ConfigError
 from uav_sim.faults.schedule import FaultLine
+from uav_sim.laser import Laser, load_laser
 from uav_sim.m100 import SimulatedM100
 from uav_sim.plant import Vector
 from uav_sim.preset import PACKET_PERIOD, load_preset
@@ -36,6 +37,7 @@ class FleetSettings:
 
     preset: str = "dji_hil"
     disturbance: str = "none"
+    laser: str = ""  # scanner of ``config/lasers``; empty: none
     seed: int = 0
     changes: Optional[Dict[str, Any]] = None  # values that win over all presets
     source: str = "changes"  # where these come from, for the words of an error
@@ -119,7 +121,7 @@ def make_fleet(
     """Return vehicles in their places, with the obstacles of a scene around them.
 
     Raises:
-        ConfigError: an unknown preset or level, presets with different steps, a name that an
+        ConfigError: an unknown preset, level or laser, presets with different steps, a name that an
             obstacle has, or vehicles that touch each other.
     """
     vehicles: Dict[str, SimulatedM100] = {}
@@ -138,7 +140,9 @@ def make_fleet(
         level = load_disturbance(entry.disturbance or settings.disturbance)
         disturbance = Disturbance(level, settings.seed, entry.name)
         world = World(scene, preset.radius, entry.name)
-        vehicles[entry.name] = SimulatedM100(preset, world, disturbance)
+        vehicle = vehicles[entry.name] = SimulatedM100(preset, world, disturbance)
+        if settings.laser:
+            vehicle.laser = Laser(load_laser(settings.laser), f"{settings.seed}/{entry.name}")
     for entry in entries:
         airborne = entry.spawn[2] > 0.0
         vehicles[entry.name].place(entry.spawn, yaw=entry.yaw, airborne=airborne)

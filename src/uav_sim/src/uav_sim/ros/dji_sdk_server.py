@@ -10,6 +10,7 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import String
 
 from dji_sdk.msg import GPSUTC, FCTimeInUTC, MobileData, PayloadData, VOPosition
+from uav_sim.autopilot import Receipt
 from uav_sim.m100 import SimulatedM100
 from uav_sim.ros.conversions import TELEMETRY
 from uav_sim.ros.payload_services import PayloadServices
@@ -66,6 +67,8 @@ class DjiSdkServer:
         for topic, _, value in packets:
             if topic in self._publishers:
                 self._publishers[topic].publish(TELEMETRY[topic].convert(stamp, value))
+        for receipt in self._sim.late_receipts:
+            self._judge("setpoint", receipt)
         for event in self._sim.autopilot.take_events():
             self._warn(event)
         for line in self._throttle.overdue():
@@ -84,9 +87,12 @@ class DjiSdkServer:
     def _on_setpoint(self, message: Joy, suffix: str) -> None:
         with self._lock:
             receipt = self._sim.setpoint(suffix, message.axes)
+        self._judge(f"setpoint {suffix}", receipt)
+
+    def _judge(self, name: str, receipt: Receipt) -> None:
         if receipt.text:
             became = "clamped" if receipt.accepted else "ignored"
-            self._warn(f"setpoint {suffix} {became}: {receipt.text}")
+            self._warn(f"{name} {became}: {receipt.text}")
 
     def _warn(self, text: str) -> None:
         line = self._throttle.line(text)

@@ -54,6 +54,7 @@ def read_fleet() -> Tuple[Fleet, bool]:
     settings = FleetSettings(
         preset=_text("preset", "dji_hil"),
         disturbance=_text("disturbance", "none"),
+        laser=_text("laser"),
         seed=_whole("seed"),
         changes=load_yaml(changes) if changes else None,
         source=changes,

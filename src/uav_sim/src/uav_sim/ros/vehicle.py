@@ -7,6 +7,7 @@ Publishers beside those of dji_sdk, below the vehicle's namespace:
     uav_sim/collision (std_msgs/String): one line per contact of the hull; latched.
     uav_sim/faults (nmpc_msgs/FaultArray): active faults; latched.
     obstacles (nmpc_msgs/ObstacleArray): as sensed, at 10 Hz, where there are any.
+    scan (sensor_msgs/LaserScan), and its frame on /tf: ``laser_port.py``; where there is a laser.
     /tf: world to ``vicon_frame``, where the level of disturbance has motion capture.
 """
 
@@ -28,6 +29,7 @@ from uav_sim.ros.conversions import (
 )
 from uav_sim.ros.dji_sdk_server import QUEUE, DjiSdkServer
 from uav_sim.ros.faults import FaultServices
+from uav_sim.ros.laser_port import LaserPort
 from uav_sim.ros.ports import Ports
 from uav_sim.telemetry import Packet
 
@@ -65,7 +67,9 @@ class Vehicle:
         self._publish: Dict[str, Callable[[rospy.Time, Packet], None]] = {
             "obstacles": self._publish_obstacles,
             "vicon": self._publish_pose,
+            "scan": self._publish_scan,
         }
+        self._laser = LaserPort(sim.laser, ports) if sim.laser is not None else None
         self._driver_ports = Ports(namespace)
         self._driver = DjiSdkServer(sim, lock, self._driver_ports)
         self._driver_is_dead = False
@@ -78,6 +82,8 @@ class Vehicle:
         packets = [Packet("vicon", sim.t, pose) for pose in sim.new_poses]
         if self._has_obstacles and self._steps % self._obstacle_steps == 0:
             packets.append(Packet("obstacles", sim.t, sim.sensed_obstacles))
+        if sim.new_scan is not None:
+            packets.append(Packet("scan", sim.t, (sim.new_scan, sim.truth.rpy)))
         return sim.faults.filter(sim.t, packets)
 
     def publish(self, stamp: rospy.Time, packets: Sequence[Packet]) -> None:
@@ -115,3 +121,6 @@ class Vehicle:
     def _publish_pose(self, stamp: rospy.Time, packet: Packet) -> None:
         transform = pose_to_transform(packet.value, self._frame_id, self._vicon_frame)
         self._transforms.sendTransform(transform)
+
+    def _publish_scan(self, stamp: rospy.Time, packet: Packet) -> None:
+        self._laser.publish(stamp, *packet.value)
