@@ -66,6 +66,14 @@ class World:
         """All obstacles of the scenario, also those that have not appeared."""
         return self.scene.obstacles
 
+    @property
+    def moves(self) -> bool:
+        """Whether anything in it moves, appears or is another aircraft."""
+        bodies = self.scene.bodies(self.name)
+        return len(bodies) > len(self.obstacles) or any(
+            body.max_speed > 0.0 or body.obstacle.appear is not None for body in bodies
+        )
+
     def reset(self) -> None:
         """Forget contacts, clearances and where all aircraft were; obstacles begin anew."""
         self.collisions: List[Collision] = []
