@@ -27,6 +27,7 @@ class PositionDemo:
     def __init__(self):
         self.status, self.fix, self.position = None, None, None
         self.corners, self.reached, self.settled = [], [], 0
+        self.statuses = []
         for name in ("sdk_control_authority", "drone_task_control", "query_drone_version"):
             rospy.wait_for_service(f"dji_sdk/{name}", 20.0)
         self.authority = rospy.ServiceProxy("dji_sdk/sdk_control_authority", SDKControlAuthority)
@@ -42,6 +43,8 @@ class PositionDemo:
 
     def on_status(self, message):
         self.status = message.data
+        if message.data not in [status for status, _ in self.statuses[-1:]]:
+            self.statuses.append((message.data, rospy.Time.now().to_sec()))
 
     def on_fix(self, message):
         self.fix = message
@@ -81,6 +84,8 @@ class PositionDemo:
         seen["reached"] = self.reached
         seen["land"] = self.task(LAND).result
         seen["on_ground"] = self.wait(lambda: self.status == M100_ON_GROUND, 40.0)
+        seen["statuses"] = [status for status, _ in self.statuses]
+        seen["landed_for"] = self.statuses[-1][1] - self.statuses[-2][1]
         seen["released"] = self.authority(0).result
         return seen
 

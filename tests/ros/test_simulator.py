@@ -143,28 +143,6 @@ def test_topics_and_services_as_a_foreign_client_sees_them(ros):
     assert "Traceback" not in log
 
 
-def test_a_foreign_client_takes_off_flies_and_lands(ros):
-    ros.launch("uav_sim", "simulator.launch", speed_factor=2)
-    ros.wait_for_node("/uav_sim")
-    seen = ros.run_json("foreign_client.py", "fly", timeout=90)
-    assert seen["task_without_authority"] == 1 and seen["arm_without_authority"] == 1
-    assert seen["reference"] is True
-    assert seen["authority"] == [True, 1, 0, 2]
-    assert seen["take_off"] == [True, 1, 1, 2]
-    assert seen["velocity"] == pytest.approx([0.5, 1.0, 0.5], abs=0.1)
-    assert seen["after_pitch"][0] > 1.0, "nose down facing east flies east"
-    assert seen["after_silence"] == pytest.approx([0.0, 0.0, 0.0], abs=0.05)
-    assert seen["local_position"][1] > 2.5
-    assert seen["height"] == pytest.approx(seen["local_position"][2], abs=0.1)
-    assert seen["land"] == 2 and seen["release"] == 1
-    assert seen["statuses"] == [1, 2, 3, 4, 5, 1]
-    log = ros.output()
-    assert "setpoint generic ignored: no control authority" in log
-    assert "setpoint generic ignored: 4 axes instead of 5" in log
-    assert "setpoint generic clamped: thrust 900" in log
-    assert "Traceback" not in log
-
-
 def test_obstacles_are_published_and_a_collision_is_latched(ros, tmp_path):
     scenario = tmp_path / "tree.yaml"
     scenario.write_text(

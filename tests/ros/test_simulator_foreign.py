@@ -23,6 +23,8 @@ def test_controllers_written_for_the_aircraft_fly_unmodified(flights):
     assert demo.pop("gained") == pytest.approx(1.2, abs=0.1)
     corners = [(2.0, 0.0, 3.0), (2.0, 2.0, 3.0), (0.0, 2.0, 3.0), (0.0, 0.0, 3.0)]
     assert demo.pop("reached") == [pytest.approx(corner, abs=0.2) for corner in corners]
+    assert demo.pop("statuses") == [1, 2, 3, 4, 5, 1]
+    assert demo.pop("landed_for") == pytest.approx(2.0, abs=0.15)
     assert all(demo.values()), demo
 
     velocity = flights.run_json("foreign_velocity.py")
