@@ -163,6 +163,32 @@ def test_leaving_f_before_lift_off_stops_the_motors():
     assert sim.phase is Phase.STANDBY and not sim.plant.motors_on
 
 
+@pytest.mark.parametrize("mode", ["P", "A", "F"])
+def test_a_pilot_takes_off_by_the_sticks_and_a_controller_takes_over(mode):
+    sim = simulator()
+    sim.rc.mode = mode
+    sim.rc.roll, sim.rc.pitch, sim.rc.yaw, sim.rc.throttle = 1.0, -1.0, -1.0, -1.0
+    sim.run(0.8)
+    assert not sim.plant.motors_on
+    sim.run(0.4)
+    assert sim.plant.motors_on and sim.autopilot.flight_status == 1
+    sim.rc.roll = sim.rc.pitch = sim.rc.yaw = sim.rc.throttle = 0.0
+    sim.run(1.0)
+    assert sim.plant.on_ground
+    sim.rc.throttle = 0.3
+    sim.run(3.0)
+    sim.rc.throttle = 0.0
+    assert sim.autopilot.flight_status == 3 and sim.truth.position[2] > 1.0
+    sim.rc.mode = "F"
+    sim.run(0.1)
+    assert sim.control_authority(True).result
+    stream(sim, 2.0, "ENUvelocity_yawrate", (1.0, 0.0, 0.0, 0.0))
+    assert sim.truth.velocity[0] > 0.7
+    sim.rc.mode, sim.rc.throttle = "P", -1.0
+    sim.run(8.0)
+    assert sim.phase is Phase.STANDBY and not sim.plant.motors_on
+
+
 def test_rc_that_comes_back_takes_over_from_return_home():
     sim = hovering()
     sim.plant.place((60.0, 0.0, 30.0))

@@ -11,12 +11,20 @@ from uav_sim.authority import Ack, ControlAuthority
 from uav_sim.auto_flight import AutoFlight
 from uav_sim.flight_loops import FlightLoops
 from uav_sim.guidance import Guidance
-from uav_sim.phase import FLIGHT_STATUS, TASK_GO_HOME, TASK_LAND, TASK_TAKE_OFF, TASKS, Phase
+from uav_sim.phase import (
+    FLIGHT_STATUS,
+    GOOD_GPS,
+    TASK_TAKE_OFF,
+    TASKS,
+    Phase,
+    task_objection,
+)
 from uav_sim.plant import Plant
 from uav_sim.remote_control import RemoteControl
 from uav_sim.setpoint import Horizontal, Setpoint, limited
 
-GOOD_GPS = 3  # velocity and position setpoints, and position hold, need this gps_health (3.4)
+STICK_COMMAND_TIME = 1.0  # [s] sticks held in their lower corners start the motors; assumption
+LIFT_OFF_THROTTLE = 0.1  # [1] stick above centre with which the pilot lifts off; assumption
 CARRYING = 0.9  # [1] less than this part of the hover thrust does not carry the aircraft
 
 
@@ -52,7 +60,7 @@ class Autopilot:
         """Take over a plant just placed at ``t`` [s] on the ground, or hovering in the air."""
         x, y, z = self._plant.position
         self._home = (x, y, 0.0 if airborne else z)
-        self._t = self._rc_seen = t
+        self._t = self._rc_seen = self._corners_since = t
         self.control.held = authority
         preset = self._plant.preset
         lift = preset.thrust.acceleration(self._plant.hover_percent)
@@ -178,24 +186,11 @@ class Autopilot:
 
     def _task_objection(self, number: int) -> str:
         """Return why a task is refused; empty if it is not."""
-        phase = self.phase
-        if number not in TASKS:
-            return "no such task"
         if not self.rc.allows_sdk:
             return f"the RC is in {self.rc.mode}" if self.rc.connected else "the RC is off"
         if self._undocumented.tasks_need_authority and not self.control.held:
             return "no control authority"
-        if number == TASK_TAKE_OFF and (phase is not Phase.STANDBY or self._plant.motors_on):
-            standing = phase is Phase.STANDBY
-            return "the motors are on already" if standing else f"the aircraft is {phase.value}"
-        if number == TASK_GO_HOME and not self._has_position:
-            return f"gps_health is {self.gps_health}, needed is {GOOD_GPS}"
-        aloft = (Phase.TAKING_OFF, Phase.FLYING, Phase.GOING_HOME)
-        if number == TASK_LAND and phase not in aloft:
-            return f"the aircraft is {phase.value}"
-        if number == TASK_GO_HOME and phase is not Phase.FLYING:
-            return f"the aircraft is {phase.value}"
-        return ""
+        return task_objection(number, self.phase, self._plant.motors_on, self.gps_health)
 
     def _hand_over(self, t: float) -> None:
         """End a task that runs while the switch is out of F: the pilot has it (section 5)."""
@@ -225,8 +220,21 @@ class Autopilot:
                 self.phase = Phase.FLYING
             return
         self._plant.command(0.0, 0.0, 0.0, 0.0)
+        self._obey_pilot(t)
         if self.phase is Phase.LANDED and t - self._since >= self._settings.landed_time:
             self._enter(t, Phase.STANDBY)
+
+    def _obey_pilot(self, t: float) -> None:
+        """Start the motors after the pilot's stick command, lift off when he gives throttle."""
+        if not self.rc.starts_motors:
+            self._corners_since = t
+        elif not self._plant.motors_on and t - self._corners_since >= STICK_COMMAND_TIME:
+            self._plant.motors_on = True
+            self._loops.start()
+            self._enter(t, Phase.STANDBY)
+        if self._plant.motors_on and self.rc.sticks()[3] > LIFT_OFF_THROTTLE:
+            self._home = self._plant.position
+            self._enter(t, Phase.FLYING)
 
     def _spin_up(self, t: float) -> None:
         self._plant.command(0.0, 0.0, 0.0, 0.0)

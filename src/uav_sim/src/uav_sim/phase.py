@@ -3,7 +3,9 @@
 
 import enum
 
+GOOD_GPS = 3  # velocity and position setpoints, and position hold, need this gps_health (3.4)
 TASK_GO_HOME, TASK_TAKE_OFF, TASK_LAND = 1, 4, 6
+_MOTORS_ON = "the motors are on already"
 
 
 class Phase(enum.Enum):
@@ -33,3 +35,18 @@ FLIGHT_STATUS = {
     Phase.LANDING: 4,
     Phase.LANDED: 5,
 }
+
+
+def task_objection(number: int, phase: Phase, motors_on: bool, gps_health: int) -> str:
+    """Return why a task cannot begin now, whoever asks for it; empty if it can."""
+    elsewhere = f"the aircraft is {phase.value}"
+    if number not in TASKS:
+        return "no such task"
+    if number == TASK_TAKE_OFF:
+        standing = phase is Phase.STANDBY
+        return "" if standing and not motors_on else _MOTORS_ON if standing else elsewhere
+    if number == TASK_LAND:
+        return "" if phase in (Phase.TAKING_OFF, Phase.FLYING, Phase.GOING_HOME) else elsewhere
+    if gps_health < GOOD_GPS:
+        return f"gps_health is {gps_health}, needed is {GOOD_GPS}"
+    return "" if phase is Phase.FLYING else elsewhere
