@@ -7,6 +7,7 @@ from typing import Callable
 # [s] of simulated time that is caught up in one burst; the rest stays lost, or subscribers would
 # see a clock that runs ahead of the telemetry still in their sockets
 MAX_LAG = 0.03
+TURN = 0.005  # [s] of wall time after which other threads get a turn where nothing is waited for
 
 
 class Pacer:
@@ -34,9 +35,12 @@ class Pacer:
         self._steps = 0
 
     def wait(self) -> None:
-        """Return when the next step is due; with speed factor 0 after a turn for other threads."""
+        """Return when the next step is due; at once with speed factor 0."""
         if self._period == 0.0:
-            self._sleep(0.0)
+            now = self._clock()
+            if now - self._epoch >= TURN:
+                self._epoch = now
+                self._sleep(0.0)
             return
         self._steps += 1
         remaining = self._epoch + self._steps * self._period - self._clock()
