@@ -5,7 +5,7 @@ None of it is simulated. Each answers as the node does where there is nothing be
 upload is refused, because a mission accepted here would never be flown (doc/dji_sdk.md 4).
 """
 
-from typing import Any, Optional
+from typing import Any, Optional, Tuple
 
 import rospy
 from geometry_msgs.msg import Vector3Stamped
@@ -19,15 +19,15 @@ from uav_sim.ros.throttle import Throttle
 _NOT_IN_F, _NO_AUTHORITY, _NO_MISSION = 0xD0, 0xD1, 0xD3  # of the mission command set
 _NOT_PERMITTED = 0xFF02  # of all command sets
 _MISSIONS = 3  # command set
-# Service -> type and command id of what only a mission could answer.
+# Service -> type and command id, or one id for each action, of what only a mission could answer.
 _ACKED = {
-    "mission_waypoint_upload": (srv.MissionWpUpload, 0x10),
-    "mission_waypoint_action": (srv.MissionWpAction, 0x12),
-    "mission_hotpoint_upload": (srv.MissionHpUpload, 0x20),
-    "mission_hotpoint_action": (srv.MissionHpAction, 0x20),
-    "mission_hotpoint_updateYawRate": (srv.MissionHpUpdateYawRate, 0x23),
-    "mission_hotpoint_updateRadius": (srv.MissionHpUpdateRadius, 0x24),
-    "mission_hotpoint_resetYaw": (srv.MissionHpResetYaw, 0x25),
+    "mission_waypoint_upload": (srv.MissionWpUpload, (0x10,)),
+    "mission_waypoint_action": (srv.MissionWpAction, (0x12, 0x12, 0x13, 0x13)),
+    "mission_hotpoint_upload": (srv.MissionHpUpload, (0x20,)),
+    "mission_hotpoint_action": (srv.MissionHpAction, (0x20, 0x21, 0x22, 0x22)),
+    "mission_hotpoint_updateYawRate": (srv.MissionHpUpdateYawRate, (0x23,)),
+    "mission_hotpoint_updateRadius": (srv.MissionHpUpdateRadius, (0x24,)),
+    "mission_hotpoint_resetYaw": (srv.MissionHpResetYaw, (0x25,)),
 }
 _CAMERA = ("photo", "start of a video", "end of a video")
 
@@ -38,8 +38,8 @@ class PayloadServices:
     def __init__(self, sim: SimulatedM100, ports: Ports) -> None:
         self._sim = sim
         self._throttle = Throttle()
-        for name, (service, cmd_id) in _ACKED.items():
-            ports.service(f"dji_sdk/{name}", service, self._acked(name, service, cmd_id))
+        for name, (service, cmd_ids) in _ACKED.items():
+            ports.service(f"dji_sdk/{name}", service, self._acked(name, service, cmd_ids))
         for name, service, handler in (
             ("mission_waypoint_getInfo", srv.MissionWpGetInfo, self._on_waypoint_info),
             ("mission_waypoint_getSpeed", srv.MissionWpGetSpeed, self._on_get_speed),
@@ -54,7 +54,7 @@ class PayloadServices:
         for name, kind in (("gimbal_angle_cmd", Gimbal), ("gimbal_speed_cmd", Vector3Stamped)):
             ports.subscriber(f"dji_sdk/{name}", kind, self._on_gimbal, name)
 
-    def _acked(self, name: str, service: Any, cmd_id: int) -> Any:
+    def _acked(self, name: str, service: Any, cmd_ids: Tuple[int, ...]) -> Any:
         is_upload = name.endswith("upload")
 
         def handle(request: Any) -> Any:
@@ -66,6 +66,8 @@ class PayloadServices:
                 ack = _NOT_PERMITTED if is_upload else _NO_MISSION
             why = "missions are not simulated" if is_upload else "no mission was uploaded"
             rospy.logwarn(f"{name} refused: {why} (ack 0x{ack:02X})")
+            action = getattr(request, "action", 0)
+            cmd_id = cmd_ids[action] if action < len(cmd_ids) else 0
             return service._response_class(False, _MISSIONS, cmd_id, ack)
 
         return handle
