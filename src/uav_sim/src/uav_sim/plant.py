@@ -70,6 +70,18 @@ class Plant:
             line.fill(0.0)
         self._thrust_line.fill(preset.thrust.acceleration(hover))
 
+    def set_motion(
+        self, velocity: Sequence[float], rpy: Sequence[float], rpy_rates: Sequence[float]
+    ) -> None:
+        """Go on from a velocity (3,) [m/s], roll, pitch, yaw (3,) [rad] and their rates [rad/s].
+
+        Position and commands under way stay.
+        """
+        self.velocity = tuple(float(v) for v in velocity)
+        self._roll.value, self._pitch.value, self.yaw = (float(v) for v in rpy)
+        self._roll.rate, self._pitch.rate, self._yaw_rate.value = (float(v) for v in rpy_rates)
+        self._yaw_rate.rate = 0.0
+
     @property
     def hover_percent(self) -> float:
         """Thrust percentage that carries this aircraft as it is."""
