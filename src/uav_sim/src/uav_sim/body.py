@@ -11,7 +11,7 @@ from typing import NamedTuple, Optional, Sequence, Tuple
 from uav_sim.motion import STILL, Chase, Vector
 from uav_sim.obstacle import Obstacle
 
-CHORD_TOLERANCE = 1e-3  # [m] a curved path leaves the chords that stand for it by no more than this
+CHORD_TOLERANCE = 5e-4  # [m] a curved path leaves the chords that stand for it by no more than this
 _CHASE_STEP = 0.02  # [s] longest step of a pursuit
 
 Sample = Tuple[float, Vector]  # [s], [m]
@@ -38,6 +38,7 @@ class Body:
     def __init__(self, obstacle: Obstacle) -> None:
         self.obstacle = obstacle
         self.max_speed = 0.0  # [m/s] bound
+        self.heeds_aircraft = obstacle.appear is not None  # else ``t`` is all it has to be told
         self.reset()
 
     def reset(self) -> None:
@@ -111,7 +112,7 @@ class ChaseBody(Body):
     def __init__(self, obstacle: Obstacle, chase: Chase) -> None:
         self._chase = chase
         super().__init__(obstacle)
-        self.max_speed = chase.speed
+        self.max_speed, self.heeds_aircraft = chase.speed, True
 
     def reset(self) -> None:
         """Begin anew at t = 0, at rest."""

@@ -29,6 +29,8 @@ class Scene:
     def __init__(self, obstacles: Sequence[Obstacle] = ()) -> None:
         self.obstacles = tuple(obstacles)
         self._bodies = [make_body(obstacle) for obstacle in self.obstacles]
+        self._heeding = [body for body in self._bodies if body.heeds_aircraft]
+        self._others = [body for body in self._bodies if not body.heeds_aircraft]
         self._observers: List[Observer] = []
         self._aircraft: Dict[str, AircraftBody] = {}
         self._around: Dict[str, Tuple[Body, ...]] = {}
@@ -77,10 +79,13 @@ class Scene:
     def _advance(self, t: float) -> None:
         last, now = self._last, self._now
         self._last, self._now = now, {}
-        starts = [last.get(name, sample)[1] for name, sample in now.items()]
-        ends = [position for _, position in now.values()]
-        for body in self._bodies:
-            body.advance(t, starts, ends)
+        for body in self._others:
+            body.t = t
+        if self._heeding:
+            starts = [last.get(name, sample)[1] for name, sample in now.items()]
+            ends = [position for _, position in now.values()]
+            for body in self._heeding:
+                body.advance(t, starts, ends)
         if len(now) > 1:
             for name, sample in now.items():
                 self._aircraft[name].move(*sample)
