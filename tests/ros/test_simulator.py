@@ -136,7 +136,7 @@ def test_topics_and_services_as_a_foreign_client_sees_them(ros):
     )
     assert answers["send_data_to_mobile"] == answers["send_data_to_payload"] == [True]
     assert answers["camera"] == [True, True, True, False]
-    log = ros.output()
+    log = ros.output_of_all()
     assert "gimbal_angle_cmd ignored: no gimbal is simulated" in log
     assert "mission_waypoint_upload refused: missions are not simulated (ack 0xD1)" in log
     assert "task 0: refused, no such task (ack 1)" in log

@@ -49,7 +49,7 @@ def test_controllers_written_for_the_aircraft_fly_unmodified(flights):
     assert attitude.pop("errors_later") == pytest.approx([0.0, 0.0, -1.0], abs=0.15)
     assert 0.05 < attitude.pop("largest_rate") < 3.0
     assert all(attitude.values()), attitude
-    log = flights.output()
+    log = flights.output_of_all()
     assert "following setpoints: horizontal angle, vertical velocity, yaw rate, body" in log
     assert "following setpoints: horizontal angle, vertical position, yaw rate, body" in log
     assert "Traceback" not in log

@@ -186,6 +186,8 @@ class Autopilot:
 
     def _task_objection(self, number: int) -> str:
         """Return why a task is refused; empty if it is not."""
+        if number not in TASKS:
+            return "no such task"
         if not self.rc.allows_sdk:
             return f"the RC is in {self.rc.mode}" if self.rc.connected else "the RC is off"
         if self._undocumented.tasks_need_authority and not self.control.held:
