@@ -64,7 +64,9 @@ class DisturbanceParameters:
 class Disturbance:
     """One draw of a level, for one aircraft; None stands for what is not disturbed."""
 
-    def __init__(self, parameters: DisturbanceParameters, seed: int = 0, vehicle: str = "") -> None:
+    def __init__(
+        self, parameters: DisturbanceParameters, seed: int = 0, vehicle: str = "aircraft"
+    ) -> None:
         self.parameters = p = parameters
         self.seed = seed
         self._vehicle = vehicle
