@@ -84,10 +84,12 @@ class Simulator(Thread):
 
     def run(self):
         while not self.ended:
-            if self.gate.take(0.01):
+            if self.gate.take():
                 self.steps += 1
                 self.gate.taken()
                 time.sleep(0.0001)
+            else:
+                self.gate.stand(0.01)
 
 
 @pytest.fixture

@@ -52,6 +52,9 @@ class Fleet:
     def __init__(self, vehicles: Mapping[str, SimulatedM100]) -> None:
         self.vehicles: Dict[str, SimulatedM100] = dict(vehicles)
         self._first = next(iter(self.vehicles.values()))
+        self._steps = 0
+        delay = round(self._first.preset.delay.telemetry / self.step_time)
+        self._phase = delay % self.steps_per_packet
 
     @property
     def t(self) -> float:
@@ -68,11 +71,17 @@ class Fleet:
         """Number of steps from one telemetry packet to the next."""
         return round(PACKET_PERIOD / self.step_time)
 
+    @property
+    def in_phase(self) -> bool:
+        """Whether the last step ended when the first vehicle's undisturbed packets arrive."""
+        return self._steps % self.steps_per_packet == self._phase
+
     def step(self) -> Dict[str, List[Packet]]:
         """Advance by a step; return the packets received in it, by vehicle, oldest first.
 
         Collisions are known when all have moved: in ``world.new_collisions`` of each.
         """
+        self._steps += 1
         return {name: vehicle.step() for name, vehicle in self.vehicles.items()}
 
     def schedule(self, lines: Sequence[FaultLine]) -> None:

@@ -79,8 +79,8 @@ class Fault:
         """Return what becomes of the packets received at ``t`` [s]; called every step."""
         return packets
 
-    def flush(self) -> List[Packet]:
-        """Return the packets still held back when the fault ends."""
+    def flush(self, t: float) -> List[Packet]:
+        """Return the packets still held back when the fault ends at ``t`` [s]."""
         return []
 
     def objection(self, suffix: str) -> str:

@@ -163,7 +163,7 @@ class Faults:
         self._active.remove(entry)
         self._overrides.release(entry.fault)
         self._blow(self._aircraft.t)
-        self._late.extend(entry.fault.flush())
+        self._late.extend(entry.fault.flush(self._aircraft.t))
         self.on_change(f"fault ends at {self._aircraft.t:.2f} s ({word}): {entry.id}")
 
     def _blow(self, t: float) -> None:

@@ -117,30 +117,33 @@ class TopicDropped(TopicFault):
 
 @dataclass
 class TopicDelayed(TopicFault):
-    """Messages come late, with the stamp of their late receipt; the order is kept."""
+    """Messages come late, in order.
+
+    Those of ``dji_sdk`` carry the stamp of their late receipt, the others that of the measurement.
+    """
 
     delay: float = field(default=0.2, metadata={"min": 0.0, "max": 60.0})  # [s]
 
     def begin(self, context: Context) -> None:
         """Hold nothing back yet."""
-        self._held: Deque[Packet] = deque()
+        self._held: Deque[Tuple[float, Packet]] = deque()
 
     def filter(self, t: float, packets: List[Packet]) -> List[Packet]:
         """Hold messages back."""
         prompt = []
         for packet in packets:
             if self.concerns(packet):
-                self._held.append(packet._replace(t=packet.t + self.delay))
+                self._held.append((packet.t + self.delay, packet))
             else:
                 prompt.append(packet)
         late = []
-        while self._held and self._held[0].t <= t + 1e-9:
-            late.append(self._held.popleft())
+        while self._held and self._held[0][0] <= t + 1e-9:
+            late.append(_received(t, self._held.popleft()[1]))
         return late + prompt
 
-    def flush(self) -> List[Packet]:
+    def flush(self, t: float) -> List[Packet]:
         """All that is late comes at once when the fault ends."""
-        return list(self._held)
+        return [_received(t, packet) for _, packet in self._held]
 
 
 @dataclass
@@ -177,6 +180,10 @@ class TopicJump(TopicFault):
             p._replace(value=shifted(p.topic, p.value, self.offset)) if self.concerns(p) else p
             for p in packets
         ]
+
+
+def _received(t: float, packet: Packet) -> Packet:
+    return packet if packet.topic in SURROUNDINGS else packet._replace(t=t)
 
 
 def _sum(a: Tuple[float, ...], b: Tuple[float, ...]) -> Tuple[float, ...]:

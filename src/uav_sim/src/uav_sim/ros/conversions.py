@@ -141,9 +141,11 @@ def obstacles_to_msg(
     return message
 
 
-def pose_to_transform(pose: ViconPose, frame_id: str, child_frame_id: str) -> TransformStamped:
-    """Return a captured pose, stamped with the time of capture, as vicon_bridge does."""
-    message = TransformStamped(Header(0, to_time(pose.t), frame_id), child_frame_id, Transform())
+def pose_to_transform(
+    stamp: rospy.Time, pose: ViconPose, frame_id: str, child_frame_id: str
+) -> TransformStamped:
+    """Return a captured pose; vicon_bridge stamps it with the time of capture."""
+    message = TransformStamped(Header(0, stamp, frame_id), child_frame_id, Transform())
     message.transform.translation = Vector3(*pose.position)
     message.transform.rotation = Quaternion(*pose.orientation)
     return message

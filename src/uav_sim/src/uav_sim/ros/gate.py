@@ -10,6 +10,7 @@ class Gate:
     def __init__(self, paused: bool = False) -> None:
         self._change = Condition()
         self._paused = paused
+        self._stands = False  # the simulating thread has seen that it is paused
         self._wanted = 0  # steps still to take while paused
 
     @property
@@ -24,12 +25,9 @@ class Gate:
             self._wanted = 0
             self._change.notify_all()
 
-    def take(self, timeout: float) -> bool:
-        """Return whether a step may be taken, after at most a wall time [s]; for the simulator."""
-        with self._change:
-            if self._paused and self._wanted == 0:
-                self._change.wait(timeout)
-            return not self._paused or self._wanted > 0
+    def take(self) -> bool:
+        """Return whether a step may be taken; for the simulator."""
+        return not self._paused or self._wanted > 0
 
     def taken(self) -> None:
         """Count a step that has been taken; for the simulator."""
@@ -38,9 +36,19 @@ class Gate:
                 self._wanted = max(0, self._wanted - 1)
                 self._change.notify_all()
 
+    def stand(self, timeout: float) -> None:
+        """Wait until a step may be taken, or for a wall time [s]; for the simulator."""
+        with self._change:
+            self._stands = True
+            self._change.notify_all()
+            self._change.wait_for(self.take, timeout)
+            self._stands = False
+
     def step(self, steps: int, timeout: float) -> bool:
         """Have steps taken while paused; return whether they were within a wall time [s]."""
         with self._change:
+            if not self._change.wait_for(lambda: self._stands or not self._paused, timeout):
+                return False
             if not self._paused:
                 return False
             self._wanted += steps

@@ -43,8 +43,11 @@ class TimeControl:
 
     def wait(self) -> bool:
         """Return whether to step now; False after a moment in which time stood still."""
-        if not self._gate.take(PATIENCE):
+        if not self._gate.take():
             self._stood = True
+            if not self._fleet.in_phase:
+                return True  # time stands where the clock has been published
+            self._gate.stand(PATIENCE)
             return False
         if self._gate.paused:
             return True

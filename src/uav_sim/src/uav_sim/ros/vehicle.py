@@ -20,6 +20,7 @@ from std_msgs.msg import String
 from tf2_ros import TransformBroadcaster
 
 from nmpc_msgs.msg import ObstacleArray
+from uav_sim.fleet import Fleet
 from uav_sim.m100 import SimulatedM100
 from uav_sim.ros.conversions import (
     collision_to_msg,
@@ -33,7 +34,7 @@ from uav_sim.ros.laser_port import LaserPort
 from uav_sim.ros.ports import Ports
 from uav_sim.telemetry import Packet
 
-TRUTH_PERIOD, OBSTACLE_PERIOD = 0.01, 0.1  # [s] of simulated time
+OBSTACLE_PERIOD = 10  # packets of ground truth from one list of obstacles to the next
 
 
 class Vehicle:
@@ -42,20 +43,19 @@ class Vehicle:
     def __init__(
         self,
         sim: SimulatedM100,
+        fleet: Fleet,
         lock: Lock,
         namespace: str,
         frame_id: str,
         vicon_frame: str,
     ) -> None:
         self._sim = sim
+        self._fleet = fleet
         self._frame_id = frame_id
         self._prefix = f"{namespace}: " if namespace else ""
         ports = Ports(namespace)
         self._vicon_frame = ports.name(vicon_frame)
-        step = sim.preset.step
-        self._truth_steps = round(TRUTH_PERIOD / step)
-        self._obstacle_steps = round(OBSTACLE_PERIOD / step)
-        self._steps = 0
+        self._samples = 0  # of ground truth
         self._phase = sim.phase
         self._truth = ports.publisher("uav_sim/ground_truth", Odometry, QUEUE)
         self._collision = ports.publisher("uav_sim/collision", String, QUEUE, latch=True)
@@ -78,9 +78,8 @@ class Vehicle:
     def surroundings(self) -> List[Packet]:
         """Return what others than dji_sdk report of this step, faults applied; call it locked."""
         sim = self._sim
-        self._steps += 1
         packets = [Packet("vicon", sim.t, pose) for pose in sim.new_poses]
-        if self._has_obstacles and self._steps % self._obstacle_steps == 0:
+        if self._has_obstacles and self._shows_obstacles:
             packets.append(Packet("obstacles", sim.t, sim.sensed_obstacles))
         if sim.new_scan is not None:
             packets.append(Packet("scan", sim.t, (sim.new_scan, sim.truth.rpy)))
@@ -94,11 +93,12 @@ class Vehicle:
         for packet in packets:
             if packet.topic in self._publish:
                 self._publish[packet.topic](stamp, packet)
-        if self._steps % self._truth_steps == 0:
+        if self._fleet.in_phase:
             self._truth.publish(truth_to_odometry(stamp, sim.truth, self._frame_id))
-        if self._has_obstacles and self._steps % self._obstacle_steps == 0:
-            states = obstacles_to_msg(stamp, sim.world.states(), self._frame_id)
-            self._true_obstacles.publish(states)
+            if self._has_obstacles and self._shows_obstacles:
+                states = obstacles_to_msg(stamp, sim.world.states(), self._frame_id)
+                self._true_obstacles.publish(states)
+            self._samples += 1
         for collision in sim.new_collisions:
             message = collision_to_msg(collision)
             self._collision.publish(message)
@@ -106,6 +106,10 @@ class Vehicle:
         if sim.phase is not self._phase:
             self._phase = sim.phase
             rospy.loginfo(f"{self._prefix}the aircraft is {sim.phase.value}, t = {sim.t:.2f} s")
+
+    @property
+    def _shows_obstacles(self) -> bool:
+        return self._fleet.in_phase and self._samples % OBSTACLE_PERIOD == 0
 
     def report(self) -> None:
         """Show faults that have begun or ended; end the driver if that is one of them."""
@@ -116,11 +120,17 @@ class Vehicle:
             rospy.logerr(f"{self._prefix}dji_sdk is dead: no topic and no service any more")
 
     def _publish_obstacles(self, stamp: rospy.Time, packet: Packet) -> None:
-        self._obstacles.publish(obstacles_to_msg(stamp, packet.value, self._frame_id))
+        sensed = self._time_of(stamp, packet.t)
+        self._obstacles.publish(obstacles_to_msg(sensed, packet.value, self._frame_id))
 
     def _publish_pose(self, stamp: rospy.Time, packet: Packet) -> None:
-        transform = pose_to_transform(packet.value, self._frame_id, self._vicon_frame)
+        captured, pose = self._time_of(stamp, packet.value.t), packet.value
+        transform = pose_to_transform(captured, pose, self._frame_id, self._vicon_frame)
         self._transforms.sendTransform(transform)
 
     def _publish_scan(self, stamp: rospy.Time, packet: Packet) -> None:
-        self._laser.publish(stamp, *packet.value)
+        self._laser.publish(self._time_of(stamp, packet.t), *packet.value)
+
+    def _time_of(self, stamp: rospy.Time, t: float) -> rospy.Time:
+        """Return the ROS time of a simulated time ``t`` [s] where it is ``stamp`` now."""
+        return stamp - rospy.Duration.from_sec(self._sim.t - t)
