@@ -179,8 +179,13 @@ class Telemetry:
         if self.link is None:
             self._pending.extend(Packet(topic, received, value) for topic, value in values)
             return
+        pending = self._pending
         for arrival, topic, value in self.link.arrivals(received, values):
-            insert(self._pending, Packet(topic, arrival, value), when=1)
+            packet = Packet(topic, arrival, value)
+            if not pending or pending[-1].t <= arrival:
+                pending.append(packet)
+            else:
+                insert(pending, packet, when=1)
 
     def due(self, t: float) -> List[Packet]:
         """Return the packets received until ``t`` [s], oldest first."""
