@@ -44,6 +44,14 @@ class ControlAuthority:
         self.held = enable
         return _reply(True, OBTAINED if enable else RELEASED)
 
+    def objection(self, must_hold: bool = True) -> str:
+        """Return why the onboard computer may not command now; empty if it may."""
+        if not self._rc.connected:
+            return "the RC is off"
+        if not self._rc.allows_sdk:
+            return f"the RC is in {self._rc.mode}"
+        return "" if self.held or not must_hold else "no control authority"
+
     def update(self) -> bool:
         """Follow the RC's switch; return whether the authority was lost just now."""
         if not self._rc.connected:

@@ -3,6 +3,7 @@
 
 import re
 import time
+from threading import Lock
 from typing import Callable, Dict, List, Optional
 
 PERIOD = 1.0  # [s] of wall time
@@ -17,32 +18,35 @@ class _Kind:
 
 
 class Throttle:
-    """Lines that differ only in their numbers are of one kind."""
+    """Lines that differ only in their numbers are of one kind; any thread may ask."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
+        self._lock = Lock()
         self._kinds: Dict[str, _Kind] = {}
 
     def line(self, text: str) -> Optional[str]:
         """Return the line to write now for something that happened, or None."""
         now, key = self._clock(), _NUMBER.sub("#", text)
-        kind = self._kinds.get(key)
-        if kind is None:
-            self._kinds[key] = _Kind(now, text)
-            return text
-        kind.text = text
-        kind.hidden += 1
-        return self._show(kind, now) if now - kind.shown >= PERIOD else None
+        with self._lock:
+            kind = self._kinds.get(key)
+            if kind is None:
+                self._kinds[key] = _Kind(now, text)
+                return text
+            kind.text = text
+            kind.hidden += 1
+            return self._show(kind, now) if now - kind.shown >= PERIOD else None
 
     def overdue(self) -> List[str]:
         """Return lines for what was left out more than a second ago; forgets kinds long unseen."""
         now, lines = self._clock(), []
-        for key, kind in list(self._kinds.items()):
-            if now - kind.shown >= PERIOD:
-                if kind.hidden:
-                    lines.append(self._show(kind, now))
-                else:
-                    del self._kinds[key]
+        with self._lock:
+            for key, kind in list(self._kinds.items()):
+                if now - kind.shown >= PERIOD:
+                    if kind.hidden:
+                        lines.append(self._show(kind, now))
+                    else:
+                        del self._kinds[key]
         return lines
 
     @staticmethod
