@@ -5,12 +5,14 @@ Follows doc/dji_sdk.md sections 3.5, 4, 5, 9; what that page marks as open is a 
 ``common.yaml``.
 """
 
-from typing import List, NamedTuple, Optional
+from collections import deque
+from typing import Deque, List, NamedTuple, Optional
 
 from uav_sim.authority import Ack, ControlAuthority
 from uav_sim.auto_flight import AutoFlight
 from uav_sim.flight_loops import FlightLoops
 from uav_sim.guidance import Guidance
+from uav_sim.low_battery import LowBattery
 from uav_sim.phase import (
     FLIGHT_STATUS,
     GOOD_GPS,
@@ -48,8 +50,9 @@ class Autopilot:
         self._plant = plant
         self._settings = plant.preset.flight_controller
         self._undocumented = self._settings.undocumented
+        self.low_battery = LowBattery(self._settings)
         self.control = ControlAuthority(rc, self._undocumented)
-        self._events: List[str] = []
+        self._events: Deque[str] = deque(maxlen=100)  # for whoever asks, if anybody does
         self._modes: Optional[tuple] = None  # of the setpoint followed last
         self._loops = FlightLoops(plant)
         self._guidance = Guidance(plant, self._loops)
@@ -83,8 +86,7 @@ class Autopilot:
 
     def take_events(self) -> List[str]:
         """Return in words what has happened since the last call and no topic shows."""
-        events, self._events = self._events, []
-        return events
+        return [self._events.popleft() for _ in range(len(self._events))]
 
     def control_authority(self, enable: bool) -> Ack:
         """Obtain or release the control authority."""
@@ -144,6 +146,11 @@ class Autopilot:
             self._events.append(f"control authority lost: the RC's switch is in {self.rc.mode}")
         if self.rc.connected and self.rc.mode != "F":
             self._hand_over(t)
+        if self.low_battery.is_low:
+            demand = self.low_battery.demand(self.phase, self._has_position)
+            if demand:
+                self._events.append(demand[1])
+                self._enter(t, demand[0])
         if self._setpoint_time is not None:
             silence = t - self._setpoint_time
             if silence > self._settings.cmd_timeout + 1e-9 or not self.rc.allows_sdk:
@@ -173,10 +180,9 @@ class Autopilot:
 
     def _objection(self, setpoint: Setpoint) -> str:
         """Return why a setpoint is ignored; empty if it is not."""
-        if not self.rc.allows_sdk:
-            return f"the RC is in {self.rc.mode}" if self.rc.connected else "the RC is off"
-        if not self.control.held:
-            return "no control authority"
+        objection = self.control.objection()
+        if objection:
+            return objection
         armed = self.phase is Phase.STANDBY and self._plant.motors_on
         if self.phase is not Phase.FLYING and (self._settings.setpoints_need_air or not armed):
             return f"the aircraft is {self.phase.value}"
@@ -188,15 +194,14 @@ class Autopilot:
         """Return why a task is refused; empty if it is not."""
         if number not in TASKS:
             return "no such task"
-        if not self.rc.allows_sdk:
-            return f"the RC is in {self.rc.mode}" if self.rc.connected else "the RC is off"
-        if self._undocumented.tasks_need_authority and not self.control.held:
-            return "no control authority"
-        return task_objection(number, self.phase, self._plant.motors_on, self.gps_health)
+        objection = self.control.objection(self._undocumented.tasks_need_authority)
+        state = (self.phase, self._plant.motors_on, self.gps_health)
+        return objection or task_objection(number, *state)
 
     def _hand_over(self, t: float) -> None:
         """End a task that runs while the switch is out of F: the pilot has it (section 5)."""
-        if self.phase not in (*TASKS.values(), Phase.TAKING_OFF):
+        forced = self.phase is Phase.LANDING and self.low_battery.lands
+        if forced or self.phase not in (*TASKS.values(), Phase.TAKING_OFF):
             return
         self._events.append(f"{self.phase.value} ended: the RC's switch is in {self.rc.mode}")
         if self._plant.on_ground and self.phase is not Phase.LANDING:

@@ -7,6 +7,7 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from uav_sim.autopilot import Ack, Autopilot, Phase, Receipt
+from uav_sim.battery import Battery
 from uav_sim.body import BodyState
 from uav_sim.disturbance import Disturbance
 from uav_sim.errors import SetpointError
@@ -21,6 +22,8 @@ from uav_sim.telemetry import Packet, Telemetry, body_rates
 from uav_sim.vicon import Vicon, ViconPose
 from uav_sim.wind import Wind
 from uav_sim.world import Collision, World
+
+DRAIN_PERIOD = 0.1  # [s] the battery is looked after as often as it is reported
 
 
 class Truth(NamedTuple):
@@ -50,7 +53,7 @@ class SimulatedM100:
     ) -> None:
         self.preset = preset
         self.t = 0.0  # [s]
-        self.battery = 100.0  # [percent]
+        self._battery = Battery(preset.battery)
         self.rc = RemoteControl()
         self.plant = Plant(preset)
         self.autopilot = Autopilot(self.plant, self.rc)
@@ -65,7 +68,7 @@ class SimulatedM100:
         self._telemetry = Telemetry(self.plant)
         self._steps = 0
         self._steps_per_packet = round(PACKET_PERIOD / preset.step)
-        self._discharge = 100.0 * preset.step / preset.flight_time
+        self._steps_per_drain = round(DRAIN_PERIOD / preset.step)
         self._wind: Optional[Wind] = None
         self._commands: Optional[Channel] = None
         self._vicon: Optional[Vicon] = None
@@ -104,14 +107,14 @@ class SimulatedM100:
         plant.step()
         self._steps += 1
         self.t = self._steps * self.preset.step
-        if plant.motors_on:
-            self.battery = max(0.0, self.battery - self._discharge)
         self.world.observe(self.t, plant.position)
         if self._vicon is not None:
             self.new_poses = self._vicon.poses(self.t, plant.position, plant.rpy)
         if self.laser is not None:
             self._scan(self.laser)
         if self._steps % self._steps_per_packet == 0:
+            if self._steps % self._steps_per_drain == 0:
+                self._drain()
             self._telemetry.sample(
                 self.t,
                 rc=self.rc.axes(self.preset.flight_controller.rc),
@@ -157,6 +160,15 @@ class SimulatedM100:
         return not self.faults.dead and self._telemetry.set_local_position_reference(self.t)
 
     @property
+    def battery(self) -> float:
+        """State of charge [percent]."""
+        return self._battery.percent
+
+    @battery.setter
+    def battery(self, percent: float) -> None:
+        self._battery.percent = percent
+
+    @property
     def phase(self) -> Phase:
         """What the flight controller is doing."""
         return self.autopilot.phase
@@ -196,6 +208,14 @@ class SimulatedM100:
     def clearance(self) -> Dict[str, float]:
         """Least distance [m] from hull to each obstacle's surface since the flight began, by id."""
         return self.world.clearance
+
+    def _drain(self) -> None:
+        """Discharge by the present thrust, and sag."""
+        battery, plant = self._battery, self.plant
+        if plant.motors_on:
+            battery.discharge(plant.thrust_force, DRAIN_PERIOD)
+        plant.battery_gain = battery.thrust_gain
+        self.autopilot.low_battery.take(battery.percent)
 
     def _reply(self, cmd_set: int, cmd_id: int) -> Optional[Ack]:
         """Return the reply of a dead node: none; None if it lives."""

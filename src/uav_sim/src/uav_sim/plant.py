@@ -8,9 +8,10 @@ import math
 from typing import Sequence, Tuple
 
 from uav_sim.preset import PlantPreset
-from uav_sim.response import DeadTime, make_response
+from uav_sim.response import DeadTime, make_lag, make_response
 
 Vector = Tuple[float, float, float]
+Command = Tuple[float, float, float, float]  # roll, pitch [rad], thrust [percent], yaw rate [rad/s]
 
 
 def limit_norm(x: float, y: float, limit: float) -> Tuple[float, float]:
@@ -25,9 +26,9 @@ class Plant:
     """Rigid body that follows attitude, thrust and yaw rate commands as identified.
 
     Advances in fixed steps: attitude responses exactly, translation by the midpoint rule.
-    ``thrust_gain`` multiplies the force, ``mass_factor`` the mass; ``wind`` and ``gust`` add up to
-    the air's velocity; ``reference_bias`` is added to what roll, pitch [rad] and yaw rate [rad/s]
-    follow.
+    ``thrust_gain`` and ``battery_gain`` multiply the force, ``mass_factor`` the mass; ``wind`` and
+    ``gust`` add up to the air's velocity; ``reference_bias`` is added to what roll, pitch [rad] and
+    yaw rate [rad/s] follow.
     """
 
     def __init__(self, preset: PlantPreset) -> None:
@@ -36,13 +37,19 @@ class Plant:
         self.gust: Vector = (0.0, 0.0, 0.0)
         self.reference_bias: Vector = (0.0, 0.0, 0.0)
         self.thrust_gain = 1.0
+        self.battery_gain = 1.0
         self.mass_factor = 1.0
         step, delay = preset.step, preset.delay
+        self._step = step
+        self._gravity = preset.gravity
+        self._drag = (preset.drag.x, preset.drag.y, preset.drag.z)
+        self._heading_drag = preset.drag.frame == "heading"
+        self._ground_effect = preset.ground_effect if preset.ground_effect.strength else None
+        self._laden = 1.0 + preset.payload / preset.mass
         self._roll_line = DeadTime(delay.attitude, step)
         self._pitch_line = DeadTime(delay.attitude, step)
         self._thrust_line = DeadTime(delay.thrust, step)
         self._yaw_rate_line = DeadTime(delay.yaw_rate, step)
-        self._heading_drag = preset.drag.frame == "heading"
         self.place((0.0, 0.0, 0.0), airborne=False)
 
     def place(
@@ -65,10 +72,12 @@ class Plant:
         self.on_ground = not airborne
         self.impact_speed = 0.0  # [m/s] of the last touch-down
         hover = self.hover_percent if airborne else 0.0
+        self._command: Command = (math.nan,) * 4
         self.command(0.0, 0.0, hover, 0.0)
         for line in (self._roll_line, self._pitch_line, self._yaw_rate_line):
             line.fill(0.0)
-        self._thrust_line.fill(preset.thrust.acceleration(hover))
+        self._thrust_line.fill(self._thrust_ref)
+        self._rotors = make_lag(preset.rotor_time_constant, preset.step, self._thrust_ref)
 
     def set_motion(
         self, velocity: Sequence[float], rpy: Sequence[float], rpy_rates: Sequence[float]
@@ -84,9 +93,16 @@ class Plant:
 
     @property
     def hover_percent(self) -> float:
-        """Thrust percentage that carries this aircraft as it is."""
+        """Thrust percentage that carries this aircraft as it is, away from the ground."""
         preset = self.preset
-        return preset.thrust.percent(preset.gravity * self.mass_factor / self.thrust_gain)
+        return preset.thrust.percent(preset.gravity / self._thrust_factor)
+
+    @property
+    def thrust_force(self) -> float:
+        """Thrust [1] of the rotors as a part of the nominal aircraft's weight."""
+        if not self.motors_on:
+            return 0.0
+        return self._rotors.value * self.thrust_gain * self.battery_gain / self._gravity
 
     @property
     def rpy(self) -> Vector:
@@ -98,17 +114,33 @@ class Plant:
         """Time derivatives of roll, pitch, yaw [rad/s]."""
         return self._roll.rate, self._pitch.rate, self._yaw_rate.value
 
+    @property
+    def _thrust_factor(self) -> float:
+        """Acceleration of this aircraft by that of the nominal one, for the same command."""
+        return self.thrust_gain * self.battery_gain / (self.mass_factor * self._laden)
+
     def command(self, roll: float, pitch: float, percent: float, yaw_rate: float) -> None:
         """Hold from now on roll, pitch [rad], thrust [percent] (0: idle) and yaw rate [rad/s]."""
+        command = (roll, pitch, percent, yaw_rate)
+        if command == self._command:
+            return
+        self._command = command
         self._roll_ref, self._pitch_ref = limit_norm(roll, pitch, self.preset.tilt_limit)
         self._thrust_ref = self.preset.thrust.acceleration(percent)
         self._yaw_rate_ref = yaw_rate
 
     def step(self) -> None:
         """Advance by ``preset.step``."""
-        thrust = self._thrust_line.push(self._thrust_ref) * self.thrust_gain / self.mass_factor
-        force, cos_yaw, sin_yaw = self._turn(thrust if self.motors_on else 0.0)
-        if self.position[2] <= 0.0 and force[2] <= self.preset.gravity and self.velocity[2] <= 0.0:
+        thrust = self._rotors.advance(self._thrust_line.push(self._thrust_ref))
+        z = self.position[2]
+        if not self.motors_on:
+            thrust = 0.0
+        else:
+            thrust *= self.thrust_gain * self.battery_gain / (self.mass_factor * self._laden)
+            if self._ground_effect is not None:
+                thrust *= self._ground_effect.gain(z)
+        force, cos_yaw, sin_yaw = self._turn(thrust)
+        if z <= 0.0 and force[2] <= self._gravity and self.velocity[2] <= 0.0:
             self._slide(force)
         else:
             self._fly(force, cos_yaw, sin_yaw)
@@ -116,32 +148,33 @@ class Plant:
     def _turn(self, thrust: float) -> Tuple[Vector, float, float]:
         """Advance the attitude; return mean thrust acceleration, cosine and sine of mean yaw."""
         roll, pitch, yaw_rate = self._roll, self._pitch, self._yaw_rate
-        # Legs on the ground keep the aircraft level and its heading fixed.
-        free = 0.0 if self.on_ground else 1.0
-        roll_before, pitch_before, yaw_before = roll.value, pitch.value, self.yaw
-        rate_before = yaw_rate.value
-        bias = self.reference_bias
-        roll.advance(free * (self._roll_line.push(self._roll_ref) + bias[0]))
-        pitch.advance(free * (self._pitch_line.push(self._pitch_ref) + bias[1]))
-        yaw_rate.advance(free * (self._yaw_rate_line.push(self._yaw_rate_ref) + bias[2]))
-        self.yaw = yaw_before + 0.5 * self.preset.step * (rate_before + yaw_rate.value)
-        phi, theta = 0.5 * (roll_before + roll.value), 0.5 * (pitch_before + pitch.value)
-        psi = 0.5 * (yaw_before + self.yaw)
-        cos_roll, sin_roll = math.cos(phi), math.sin(phi)
+        roll_ref = self._roll_line.push(self._roll_ref)
+        pitch_ref = self._pitch_line.push(self._pitch_ref)
+        yaw_rate_ref = self._yaw_rate_line.push(self._yaw_rate_ref)
+        if self.on_ground:  # legs keep the aircraft level and its heading fixed
+            roll_ref = pitch_ref = yaw_rate_ref = 0.0
+        else:
+            bias = self.reference_bias
+            roll_ref, pitch_ref = roll_ref + bias[0], pitch_ref + bias[1]
+            yaw_rate_ref += bias[2]
+        yaw_before, rate_before = self.yaw, yaw_rate.value
+        phi = 0.5 * (roll.value + roll.advance(roll_ref))
+        theta = 0.5 * (pitch.value + pitch.advance(pitch_ref))
+        turned = 0.5 * self._step * (rate_before + yaw_rate.advance(yaw_rate_ref))
+        self.yaw = yaw_before + turned
+        psi = yaw_before + 0.5 * turned
+        ahead, right = thrust * math.cos(phi), thrust * math.sin(phi)
+        up, ahead = ahead * math.cos(theta), ahead * math.sin(theta)
         cos_yaw, sin_yaw = math.cos(psi), math.sin(psi)
-        forward, up = cos_roll * math.sin(theta), cos_roll * math.cos(theta)
-        force = (
-            thrust * (forward * cos_yaw + sin_roll * sin_yaw),
-            thrust * (forward * sin_yaw - sin_roll * cos_yaw),
-            thrust * up,
-        )
+        force = (ahead * cos_yaw + right * sin_yaw, ahead * sin_yaw - right * cos_yaw, up)
         return force, cos_yaw, sin_yaw
 
     def _fly(self, force: Vector, cos_yaw: float, sin_yaw: float) -> None:
-        h = self.preset.step
+        h = self._step
+        half = 0.5 * h
         vx, vy, vz = self.velocity
         ax, ay, az = self._accelerate(force, vx, vy, vz, cos_yaw, sin_yaw)
-        mx, my, mz = vx + 0.5 * h * ax, vy + 0.5 * h * ay, vz + 0.5 * h * az
+        mx, my, mz = vx + half * ax, vy + half * ay, vz + half * az
         ax, ay, az = self._accelerate(force, mx, my, mz, cos_yaw, sin_yaw)
         x, y, z = self.position
         z += h * mz
@@ -158,22 +191,25 @@ class Plant:
         self, force: Vector, vx: float, vy: float, vz: float, cos_yaw: float, sin_yaw: float
     ) -> Vector:
         """Return the acceleration (3,) of thrust, drag and gravity in free air."""
-        drag, wind, gust = self.preset.drag, self.wind, self.gust
-        vx, vy, vz = vx - wind[0] - gust[0], vy - wind[1] - gust[1], vz - wind[2] - gust[2]
-        if self._heading_drag:
-            forward = drag.x * (cos_yaw * vx + sin_yaw * vy)
-            left = drag.y * (cos_yaw * vy - sin_yaw * vx)
-            drag_x, drag_y = cos_yaw * forward - sin_yaw * left, sin_yaw * forward + cos_yaw * left
-        else:
-            drag_x, drag_y = drag.x * vx, drag.y * vy
-        return force[0] - drag_x, force[1] - drag_y, force[2] - drag.z * vz - self.preset.gravity
+        (wx, wy, wz), (gx, gy, gz), (dx, dy, dz) = self.wind, self.gust, self._drag
+        vx, vy, vz = vx - wx - gx, vy - wy - gy, vz - wz - gz
+        up = force[2] - dz * vz - self._gravity
+        if not self._heading_drag:
+            return force[0] - dx * vx, force[1] - dy * vy, up
+        ahead = dx * (cos_yaw * vx + sin_yaw * vy)
+        left = dy * (cos_yaw * vy - sin_yaw * vx)
+        return (
+            force[0] - cos_yaw * ahead + sin_yaw * left,
+            force[1] - sin_yaw * ahead - cos_yaw * left,
+            up,
+        )
 
     def _slide(self, force: Vector) -> None:
         """Advance on the ground: friction carries what pushes sideways, up to its limit."""
-        h = self.preset.step
+        h = self._step
         self.on_ground = True
         vx, vy = self.velocity[0], self.velocity[1]
-        grip = h * self.preset.ground_friction * (self.preset.gravity - force[2])
+        grip = h * self.preset.ground_friction * (self._gravity - force[2])
         px, py = vx + h * force[0], vy + h * force[1]
         speed = math.hypot(px, py)
         keep = 1.0 - grip / speed if speed > grip else 0.0

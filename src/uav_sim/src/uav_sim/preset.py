@@ -66,6 +66,33 @@ class Drag:
 
 
 @dataclass(frozen=True)
+class GroundEffect:
+    """More thrust near the ground: Cheeseman and Bennett, 1955, 1 / (1 - (R / 4 z)^2)."""
+
+    strength: float = _number(0.0, 4.0)  # [1] on the squared ratio; 0: off
+    rotor_radius: float = _number(0.01)  # [m]
+    rotor_height: float = _number(0.01)  # [m] of the rotors above the ground, standing
+
+    def gain(self, z: float) -> float:
+        """Return the thrust at a height [m] of the legs above the ground by that far away."""
+        ratio = 0.25 * self.rotor_radius / (max(z, 0.0) + self.rotor_height)
+        return 1.0 / (1.0 - min(self.strength * ratio * ratio, 0.5))
+
+
+@dataclass(frozen=True)
+class BatteryModel:
+    """Discharge over time, and what a charge takes from the thrust."""
+
+    flight_time: float = _number(1.0)  # [s] hover of the nominal aircraft from 100 to 0 percent
+    idle_power: float = _number()  # [1] of the hover's, motors idle
+    hover_full: float = _number(1.0, 100.0)  # [percent] of thrust, above the knee
+    sag_slope: float = _number()  # [percent of thrust per percent of charge] below the knee
+    sag_knee: float = _number(0.0, 100.0)  # [percent]
+    cutoff: float = _number(0.1, 100.0)  # [percent] the voltage collapses from here
+    empty_gain: float = _number(0.0, 1.0)  # [1] of the thrust that is left at 0 percent
+
+
+@dataclass(frozen=True)
 class Delay:
     """Dead times of the link, one per channel of the command and one for all telemetry."""
 
@@ -146,6 +173,8 @@ class FlightController:
     landed_time: float = _number()  # [s]
     go_home_height: float = _number()  # [m]
     rc_lost_time: float = _number()  # [s]
+    battery_go_home: float = _number(0.0, 100.0)  # [percent] 0: never
+    battery_land: float = _number(0.0, 100.0)  # [percent] 0: never
     rc: RcValues = field()
     loops: Loops = field()
     undocumented: Undocumented = field()
@@ -171,6 +200,7 @@ class PlantPreset:
     pitch: Response = field()
     yaw_rate: Response = field()
     thrust: Thrust = field()
+    rotor_time_constant: float = _number()  # [s] lag of the thrust behind its command; 0: none
     drag: Drag = field()
     tilt_limit: float = _number()  # [rad] norm of the commanded (roll, pitch)
     delay: Delay = field()
@@ -178,7 +208,9 @@ class PlantPreset:
     gravity: float = _number()  # [m/s^2]
     gravity_const: float = _number()  # [m/s^2 per g] scale of the accelerometer
     ground_friction: float = _number()  # [1]
-    flight_time: float = _number(1.0)  # [s] a full battery lasts with motors on
+    ground_effect: GroundEffect = field()
+    payload: float = _number()  # [kg] on top of the mass
+    battery: BatteryModel = field()
     home: GeoPoint = field()  # the world's origin
     flight_controller: FlightController = field()
 

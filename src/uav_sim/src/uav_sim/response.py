@@ -18,11 +18,24 @@ class LagState:
         self._inverse_time = 1.0 / response.time_constant
         self._decay = math.exp(-step / response.time_constant)
 
-    def advance(self, reference: float) -> None:
-        """Advance one step with the reference held."""
+    def advance(self, reference: float) -> float:
+        """Advance one step with the reference held; return the new value."""
         target = self._gain * reference
         self.value = target + self._decay * (self.value - target)
         self.rate = (target - self.value) * self._inverse_time
+        return self.value
+
+
+class NoLag:
+    """A response that is there at once."""
+
+    def __init__(self, value: float) -> None:
+        self.value = value
+
+    def advance(self, reference: float) -> float:
+        """Take the reference; return it."""
+        self.value = reference
+        return reference
 
 
 class OscillatorState:
@@ -44,12 +57,13 @@ class OscillatorState:
         self._a11, self._a12 = decay * (c + sigma * s), decay * s
         self._a21, self._a22 = -decay * response.omega**2 * s, decay * (c - sigma * s)
 
-    def advance(self, reference: float) -> None:
-        """Advance one step with the reference held."""
+    def advance(self, reference: float) -> float:
+        """Advance one step with the reference held; return the new value."""
         target = self._gain * reference
         error, rate = self.value - target, self.rate
-        self.value = target + self._a11 * error + self._a12 * rate
         self.rate = self._a21 * error + self._a22 * rate
+        self.value = value = target + self._a11 * error + self._a12 * rate
+        return value
 
 
 def make_response(response: Response, step: float) -> Union[LagState, OscillatorState]:
@@ -57,6 +71,15 @@ def make_response(response: Response, step: float) -> Union[LagState, Oscillator
     if isinstance(response, FirstOrder):
         return LagState(response, step)
     return OscillatorState(response, step)
+
+
+def make_lag(time_constant: float, step: float, value: float) -> Union[LagState, NoLag]:
+    """Return a lag of unit gain for a time step [s], at rest at a value; without a lag at 0 s."""
+    if not time_constant:
+        return NoLag(value)
+    lag = LagState(FirstOrder(1.0, time_constant), step)
+    lag.value = value
+    return lag
 
 
 class DeadTime:

@@ -76,9 +76,7 @@ def replay(
     """
     segments = airborne_segments(recorded, preset.hover_percent, start, end)
     if not segments:
-        raise BagError(
-            "no 2 s in the air under commands of roll, pitch and thrust"
-        )
+        raise BagError("no 2 s in the air under commands of roll, pitch and thrust")
     remarks = list(recorded.remarks)
     scale = 1.0 if attitude_scale is None else attitude_scale
     motions = _fly(recorded, segments, preset, 0.0, scale)
