@@ -6,7 +6,7 @@ import logging
 import math
 import random
 from dataclasses import dataclass
-from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Callable, List, Mapping, Optional, Tuple
 
 from uav_sim.config import number
 from uav_sim.errors import ConfigError
@@ -28,14 +28,15 @@ class Entry:
     until: float  # [s] infinite: until it is cleared
 
     @property
-    def parameters(self) -> Dict[str, Any]:
-        """Values of the kind's parameters, defaults included."""
-        return dataclasses.asdict(self.fault)
+    def parameters(self) -> str:
+        """Values of the kind's parameters, defaults included, as a YAML mapping."""
+        values = dataclasses.asdict(self.fault).items()
+        lines = [f"{k}: {list(v) if isinstance(v, tuple) else v}" for k, v in values]
+        return f"{{{', '.join(lines)}}}"
 
     def __str__(self) -> str:
-        values = ", ".join(f"{name}: {value}" for name, value in self.parameters.items())
         end = f"until {self.until:.2f} s" if math.isfinite(self.until) else "until cleared"
-        return f"{self.id}: {self.kind} {{{values}}} from {self.since:.2f} s {end}"
+        return f"{self.id}: {self.kind} {self.parameters} from {self.since:.2f} s {end}"
 
 
 class Faults:

@@ -19,7 +19,7 @@ from nmpc_msgs.srv import (
 )
 from uav_sim.config import number, parse_yaml
 from uav_sim.errors import ConfigError
-from uav_sim.faults.engine import Entry, Faults
+from uav_sim.faults.engine import Faults
 from uav_sim.m100 import SimulatedM100
 from uav_sim.ros.conversions import to_time
 from uav_sim.ros.ports import Ports
@@ -34,6 +34,7 @@ class FaultServices:
         self._lock = lock
         self._prefix = f"{ports.namespace}: " if ports.namespace else ""
         self._changes: Deque[str] = deque()
+        self._reporting = Lock()  # services and the simulating thread report
         self._faults.on_change = self._changes.append
         self._publisher = ports.publisher("uav_sim/faults", FaultArray, 10, latch=True)
         self._publish()
@@ -44,15 +45,17 @@ class FaultServices:
         """Log what has changed since the last call, and publish what is active."""
         if not self._changes:
             return
-        while self._changes:
-            rospy.logwarn(self._prefix + self._changes.popleft())
-        self._publish()
+        with self._reporting:
+            while self._changes:
+                rospy.logwarn(self._prefix + self._changes.popleft())
+            self._publish()
 
     def _publish(self) -> None:
         with self._lock:
             t, active = self._sim.t, self._faults.active
-        message = FaultArray(faults=[_message(entry) for entry in active])
+        message = FaultArray()
         message.header.stamp = to_time(t)
+        message.faults = [Fault(e.id, e.kind, e.parameters, e.since, e.until) for e in active]
         self._publisher.publish(message)
 
     def _on_inject(self, request: InjectFaultRequest) -> InjectFaultResponse:
@@ -78,8 +81,3 @@ class FaultServices:
         if gone:
             return ClearFaultResponse(True, f"ended: {', '.join(gone)}")
         return ClearFaultResponse(False, f"no fault {request.id}" if request.id else "no fault")
-
-
-def _message(entry: Entry) -> Fault:
-    values = ", ".join(f"{name}: {value}" for name, value in entry.parameters.items())
-    return Fault(entry.id, entry.kind, f"{{{values}}}", entry.since, entry.until)

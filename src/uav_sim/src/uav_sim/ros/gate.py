@@ -18,12 +18,13 @@ class Gate:
         """Time stands still but for counted steps."""
         return self._paused
 
-    def pause(self, paused: bool) -> None:
-        """Stop simulated time, or let it pass again."""
+    def pause(self, paused: bool, timeout: float = 0.0) -> None:
+        """Stop simulated time, waiting for at most a wall time [s], or let it pass again."""
         with self._change:
             self._paused = paused
             self._wanted = 0
             self._change.notify_all()
+            self._change.wait_for(lambda: self._stands or not self._paused, timeout)
 
     def take(self) -> bool:
         """Return whether a step may be taken; for the simulator."""

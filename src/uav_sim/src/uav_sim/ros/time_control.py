@@ -20,6 +20,7 @@ from uav_sim.ros.pacer import Pacer
 from uav_sim.ros.ports import Ports
 
 PATIENCE = 0.1  # [s] wall time for which the simulating thread sleeps while time is paused
+PAUSE_TIMEOUT = 2.0  # [s] wall time until it stands
 STEP_TIMEOUT = 60.0  # [s] wall time for the steps of one request
 
 
@@ -65,7 +66,7 @@ class TimeControl:
         self._gate.taken()
 
     def _on_pause(self, request: SetBoolRequest) -> SetBoolResponse:
-        self._gate.pause(request.data)
+        self._gate.pause(request.data, PAUSE_TIMEOUT)
         text = f"time {'stands' if request.data else 'passes'}, t = {self._fleet.t:.3f} s"
         rospy.loginfo(text)
         return SetBoolResponse(True, text)
