@@ -224,3 +224,24 @@ def test_what_becomes_of_a_late_command_is_said():
         receipts += sim.late_receipts
     assert [r.accepted for r in receipts] == [False]
     assert "authority" in receipts[0].text
+
+
+def test_dji_holds_the_position_that_it_measures():
+    """Under drift the aircraft wanders, so that the reported place stands still."""
+    perfect = ErrorParameters(0.0, 0.0, 1.0)
+    sensors = dataclasses.replace(
+        CALM.sensors, position=ErrorParameters(0.0, 0.5, 60.0), velocity=perfect
+    )
+    level = dataclasses.replace(CALM, sensors=sensors, command=load_disturbance("none").command)
+    sim = SimulatedM100(PRESET, None, Disturbance(level, 3))
+    sim.place(HERE)
+    sim.run(5.0)
+    start, felt = sim.truth.position, []
+    wandered = 0.0
+    for _ in range(60):
+        packets = sim.run(0.5)
+        felt.append([p.value for p in packets if p.topic == "local_position"][-1])
+        wandered = max(wandered, math.dist(start[:2], sim.truth.position[:2]))
+    assert wandered > 0.15
+    assert np.std(felt, axis=0)[:2].max() < 0.5 * wandered
+    assert sim.truth.position[2] == pytest.approx(10.0, abs=0.05), "height comes from elsewhere"

@@ -2,7 +2,7 @@
 """A simulated M100 as seen through dji_sdk, without ROS: setpoints and requests in, packets out."""
 
 import math
-from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -72,6 +72,7 @@ class SimulatedM100:
         self._wind: Optional[Wind] = None
         self._commands: Optional[Channel] = None
         self._vicon: Optional[Vicon] = None
+        self._drift: Optional[Callable[[], Vector]] = None
         if disturbance is not None:
             self._disturb(disturbance)
 
@@ -103,7 +104,10 @@ class SimulatedM100:
         if self._commands is not None:
             arrived = self._commands.receive(self.t)
             self.late_receipts = [self.autopilot.setpoint(self.t, s) for s in arrived]
-        self.autopilot.update(self.t)
+        if self._drift is None:
+            self.autopilot.update(self.t)
+        else:
+            self._navigate(self._drift())
         plant.step()
         self._steps += 1
         self.t = self._steps * self.preset.step
@@ -221,6 +225,14 @@ class SimulatedM100:
         """Return the reply of a dead node: none; None if it lives."""
         return Ack(False, cmd_set, cmd_id, NO_RESPONSE) if self.faults.dead else None
 
+    def _navigate(self, drift: Vector) -> None:
+        """Have the flight controller act on its own horizontal position, which drifts."""
+        plant = self.plant
+        x, y, z = true = plant.position
+        plant.position = (x + drift[0], y + drift[1], z)
+        self.autopilot.update(self.t)
+        plant.position = true
+
     def _scan(self, laser: Laser) -> None:
         self.new_scan = None
         if laser.due(self.t):
@@ -236,3 +248,6 @@ class SimulatedM100:
         self._wind = disturbance.wind(self.preset.step)
         self._commands = disturbance.command
         self._vicon = disturbance.vicon
+        sensors = disturbance.sensors
+        if sensors is not None and disturbance.parameters.sensors.position.drift > 0.0:
+            self._drift = lambda: sensors.drift
