@@ -5,13 +5,15 @@ World ENU, body FLU, roll-pitch-yaw about x, y, z; positive pitch is nose down. 
 """
 
 import math
-from typing import Sequence, Tuple
+from math import cos, sin
+from typing import Optional, Sequence, Tuple
 
-from uav_sim.preset import PlantPreset
-from uav_sim.response import DeadTime, make_lag, make_response
+from uav_sim.preset import FirstOrder, PlantPreset
+from uav_sim.response import DeadTime, LagState, PairDeadTime, make_response
 
 Vector = Tuple[float, float, float]
 Command = Tuple[float, float, float, float]  # roll, pitch [rad], thrust [percent], yaw rate [rad/s]
+UNBIASED: Vector = (0.0, 0.0, 0.0)
 
 
 def limit_norm(x: float, y: float, limit: float) -> Tuple[float, float]:
@@ -35,7 +37,7 @@ class Plant:
         self.preset = preset
         self.wind: Vector = (0.0, 0.0, 0.0)
         self.gust: Vector = (0.0, 0.0, 0.0)
-        self.reference_bias: Vector = (0.0, 0.0, 0.0)
+        self.reference_bias: Vector = UNBIASED
         self.thrust_gain = 1.0
         self.battery_gain = 1.0
         self.mass_factor = 1.0
@@ -46,8 +48,8 @@ class Plant:
         self._heading_drag = preset.drag.frame == "heading"
         self._ground_effect = preset.ground_effect if preset.ground_effect.strength else None
         self._laden = 1.0 + preset.payload / preset.mass
-        self._roll_line = DeadTime(delay.attitude, step)
-        self._pitch_line = DeadTime(delay.attitude, step)
+        self._midpoint = tuple(1.0 - 0.5 * step * drag for drag in self._drag)
+        self._tilt_line = PairDeadTime(delay.attitude, step)
         self._thrust_line = DeadTime(delay.thrust, step)
         self._yaw_rate_line = DeadTime(delay.yaw_rate, step)
         self.place((0.0, 0.0, 0.0), airborne=False)
@@ -74,10 +76,14 @@ class Plant:
         hover = self.hover_percent if airborne else 0.0
         self._command: Command = (math.nan,) * 4
         self.command(0.0, 0.0, hover, 0.0)
-        for line in (self._roll_line, self._pitch_line, self._yaw_rate_line):
-            line.fill(0.0)
+        self._tilt_line.fill(0.0, 0.0)
+        self._yaw_rate_line.fill(0.0)
         self._thrust_line.fill(self._thrust_ref)
-        self._rotors = make_lag(preset.rotor_time_constant, preset.step, self._thrust_ref)
+        self._rotors: Optional[LagState] = None
+        if preset.rotor_time_constant:
+            self._rotors = LagState(FirstOrder(1.0, preset.rotor_time_constant), preset.step)
+            self._rotors.value = self._thrust_ref
+        self._force = self._thrust_ref
 
     def set_motion(
         self, velocity: Sequence[float], rpy: Sequence[float], rpy_rates: Sequence[float]
@@ -100,9 +106,7 @@ class Plant:
     @property
     def thrust_force(self) -> float:
         """Thrust [1] of the rotors as a part of the nominal aircraft's weight."""
-        if not self.motors_on:
-            return 0.0
-        return self._rotors.value * self.thrust_gain * self.battery_gain / self._gravity
+        return self._force / self._gravity if self.motors_on else 0.0
 
     @property
     def rpy(self) -> Vector:
@@ -131,86 +135,77 @@ class Plant:
 
     def step(self) -> None:
         """Advance by ``preset.step``."""
-        thrust = self._rotors.advance(self._thrust_line.push(self._thrust_ref))
-        z = self.position[2]
-        if not self.motors_on:
-            thrust = 0.0
-        else:
-            thrust *= self.thrust_gain * self.battery_gain / (self.mass_factor * self._laden)
-            if self._ground_effect is not None:
-                thrust *= self._ground_effect.gain(z)
-        force, cos_yaw, sin_yaw = self._turn(thrust)
-        if z <= 0.0 and force[2] <= self._gravity and self.velocity[2] <= 0.0:
-            self._slide(force)
-        else:
-            self._fly(force, cos_yaw, sin_yaw)
-
-    def _turn(self, thrust: float) -> Tuple[Vector, float, float]:
-        """Advance the attitude; return mean thrust acceleration, cosine and sine of mean yaw."""
-        roll, pitch, yaw_rate = self._roll, self._pitch, self._yaw_rate
-        roll_ref = self._roll_line.push(self._roll_ref)
-        pitch_ref = self._pitch_line.push(self._pitch_ref)
+        roll_ref, pitch_ref = self._tilt_line.push(self._roll_ref, self._pitch_ref)
         yaw_rate_ref = self._yaw_rate_line.push(self._yaw_rate_ref)
         if self.on_ground:  # legs keep the aircraft level and its heading fixed
             roll_ref = pitch_ref = yaw_rate_ref = 0.0
-        else:
+        elif self.reference_bias is not UNBIASED:
             bias = self.reference_bias
             roll_ref, pitch_ref = roll_ref + bias[0], pitch_ref + bias[1]
             yaw_rate_ref += bias[2]
-        yaw_before, rate_before = self.yaw, yaw_rate.value
+        # Thrust acts along the mean attitude of the step.
+        roll, pitch, yaw_rate = self._roll, self._pitch, self._yaw_rate
         phi = 0.5 * (roll.value + roll.advance(roll_ref))
         theta = 0.5 * (pitch.value + pitch.advance(pitch_ref))
-        turned = 0.5 * self._step * (rate_before + yaw_rate.advance(yaw_rate_ref))
-        self.yaw = yaw_before + turned
-        psi = yaw_before + 0.5 * turned
-        ahead, right = thrust * math.cos(phi), thrust * math.sin(phi)
-        up, ahead = ahead * math.cos(theta), ahead * math.sin(theta)
-        cos_yaw, sin_yaw = math.cos(psi), math.sin(psi)
-        force = (ahead * cos_yaw + right * sin_yaw, ahead * sin_yaw - right * cos_yaw, up)
-        return force, cos_yaw, sin_yaw
+        half_turn = 0.25 * self._step * (yaw_rate.value + yaw_rate.advance(yaw_rate_ref))
+        psi = self.yaw + half_turn
+        self.yaw = psi + half_turn
+        thrust, z = self._thrust(), self.position[2]
+        upright = thrust * cos(phi)
+        ahead, left, up = upright * sin(theta), -thrust * sin(phi), upright * cos(theta)
+        if z <= 0.0 and up <= self._gravity and self.velocity[2] <= 0.0:
+            self._slide(ahead, left, up, psi)
+        else:
+            self._fly(ahead, left, up, psi)
 
-    def _fly(self, force: Vector, cos_yaw: float, sin_yaw: float) -> None:
-        h = self._step
-        half = 0.5 * h
+    def _thrust(self) -> float:
+        """Advance the rotors; return their acceleration [m/s^2] along the body's z axis."""
+        thrust = self._thrust_line.push(self._thrust_ref)
+        if self._rotors is not None:
+            thrust = self._rotors.advance(thrust)
+        self._force = thrust = thrust * self.thrust_gain * self.battery_gain
+        if not self.motors_on:
+            return 0.0
+        if self._ground_effect is not None:
+            thrust *= self._ground_effect.gain(self.position[2])
+        return thrust / (self.mass_factor * self._laden)
+
+    def _fly(self, ahead: float, left: float, up: float, psi: float) -> None:
+        """Advance in free air under a thrust acceleration in heading axes, by the midpoint rule."""
+        h, cos_yaw, sin_yaw = self._step, cos(psi), sin(psi)
         vx, vy, vz = self.velocity
-        ax, ay, az = self._accelerate(force, vx, vy, vz, cos_yaw, sin_yaw)
-        mx, my, mz = vx + half * ax, vy + half * ay, vz + half * az
-        ax, ay, az = self._accelerate(force, mx, my, mz, cos_yaw, sin_yaw)
+        (wx, wy, wz), (gx, gy, gz), (dx, dy, dz) = self.wind, self.gust, self._drag
+        air_x, air_y = vx - wx - gx, vy - wy - gy
+        # Drag is linear: half a step later, acceleration has changed by this factor.
+        kx, ky, kz = self._midpoint
+        if self._heading_drag:
+            ahead = kx * (ahead - dx * (cos_yaw * air_x + sin_yaw * air_y))
+            left = ky * (left - dy * (cos_yaw * air_y - sin_yaw * air_x))
+            ax, ay = cos_yaw * ahead - sin_yaw * left, sin_yaw * ahead + cos_yaw * left
+        else:
+            ax = kx * (cos_yaw * ahead - sin_yaw * left - dx * air_x)
+            ay = ky * (sin_yaw * ahead + cos_yaw * left - dy * air_y)
+        az = kz * (up - dz * (vz - wz - gz) - self._gravity)
         x, y, z = self.position
-        z += h * mz
-        vz_next = vz + h * az
+        vx_next, vy_next, vz_next = vx + h * ax, vy + h * ay, vz + h * az
+        z += 0.5 * h * (vz + vz_next)
         self.on_ground = z <= 0.0 and vz_next <= 0.0
         if self.on_ground:
             self.impact_speed = -vz_next
             z, vz_next = 0.0, 0.0
-        self.position = (x + h * mx, y + h * my, z)
-        self.velocity = (vx + h * ax, vy + h * ay, vz_next)
-        self.acceleration = (ax, ay, (vz_next - vz) / h)
+            az = -vz / h
+        self.position = (x + 0.5 * h * (vx + vx_next), y + 0.5 * h * (vy + vy_next), z)
+        self.velocity = (vx_next, vy_next, vz_next)
+        self.acceleration = (ax, ay, az)
 
-    def _accelerate(
-        self, force: Vector, vx: float, vy: float, vz: float, cos_yaw: float, sin_yaw: float
-    ) -> Vector:
-        """Return the acceleration (3,) of thrust, drag and gravity in free air."""
-        (wx, wy, wz), (gx, gy, gz), (dx, dy, dz) = self.wind, self.gust, self._drag
-        vx, vy, vz = vx - wx - gx, vy - wy - gy, vz - wz - gz
-        up = force[2] - dz * vz - self._gravity
-        if not self._heading_drag:
-            return force[0] - dx * vx, force[1] - dy * vy, up
-        ahead = dx * (cos_yaw * vx + sin_yaw * vy)
-        left = dy * (cos_yaw * vy - sin_yaw * vx)
-        return (
-            force[0] - cos_yaw * ahead + sin_yaw * left,
-            force[1] - sin_yaw * ahead - cos_yaw * left,
-            up,
-        )
-
-    def _slide(self, force: Vector) -> None:
+    def _slide(self, ahead: float, left: float, up: float, psi: float) -> None:
         """Advance on the ground: friction carries what pushes sideways, up to its limit."""
         h = self._step
         self.on_ground = True
         vx, vy = self.velocity[0], self.velocity[1]
-        grip = h * self.preset.ground_friction * (self._gravity - force[2])
-        px, py = vx + h * force[0], vy + h * force[1]
+        grip = h * self.preset.ground_friction * (self._gravity - up)
+        px = vx + h * (cos(psi) * ahead - sin(psi) * left)
+        py = vy + h * (sin(psi) * ahead + cos(psi) * left)
         speed = math.hypot(px, py)
         keep = 1.0 - grip / speed if speed > grip else 0.0
         x, y, _ = self.position

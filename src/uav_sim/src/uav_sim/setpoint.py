@@ -7,6 +7,7 @@ yaw clockwise from north, up positive.
 
 import dataclasses
 import enum
+import functools
 import math
 from dataclasses import dataclass
 from typing import List, Sequence, Tuple
@@ -121,6 +122,7 @@ def decode(suffix: str, axes: Sequence[float]) -> Setpoint:
     return Setpoint(horizontal, vertical, yaw_mode, frame, bool(flag & 0x01), x, y, z, yaw)
 
 
+@functools.lru_cache(maxsize=256)
 def _modes(flag: int) -> Tuple[Horizontal, Vertical, Yaw, Frame]:
     if not 0 <= flag <= 0xFF:
         raise SetpointError(f"control byte {flag} is not in 0..255")
