@@ -67,6 +67,8 @@ class TelemetryLink:
         whole = self._packets.arrival(t)
         if whole is None:
             return []
+        if not self._topics:
+            return [(whole, topic, value) for topic, value in values]
         result = []
         for topic, value in values:
             link = self._topics.get(topic)

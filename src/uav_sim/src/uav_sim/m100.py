@@ -2,7 +2,7 @@
 """A simulated M100 as seen through dji_sdk, without ROS: setpoints and requests in, packets out."""
 
 import math
-from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from uav_sim.link import Channel
 from uav_sim.plant import Plant, Vector
 from uav_sim.preset import PACKET_PERIOD, PlantPreset
 from uav_sim.remote_control import RemoteControl
+from uav_sim.sensors import Sensors
 from uav_sim.setpoint import decode
 from uav_sim.telemetry import Packet, Telemetry, body_rates
 from uav_sim.vicon import Vicon, ViconPose
@@ -72,7 +73,7 @@ class SimulatedM100:
         self._wind: Optional[Wind] = None
         self._commands: Optional[Channel] = None
         self._vicon: Optional[Vicon] = None
-        self._drift: Optional[Callable[[], Vector]] = None
+        self._navigation: Optional[Sensors] = None  # of a position that drifts
         if disturbance is not None:
             self._disturb(disturbance)
 
@@ -99,15 +100,15 @@ class SimulatedM100:
         """Advance by ``preset.step``; return the packets received in it, oldest first."""
         plant = self.plant
         self.faults.update(self.t)
-        if self._wind is not None:
+        if self._wind is not None and self._steps % self._wind.steps == 0:
             plant.wind = self._wind.advance(plant.position[2], plant.velocity)
         if self._commands is not None:
             arrived = self._commands.receive(self.t)
             self.late_receipts = [self.autopilot.setpoint(self.t, s) for s in arrived]
-        if self._drift is None:
+        if self._navigation is None:
             self.autopilot.update(self.t)
         else:
-            self._navigate(self._drift())
+            self._navigate(self._navigation.drift)
         plant.step()
         self._steps += 1
         self.t = self._steps * self.preset.step
@@ -248,6 +249,5 @@ class SimulatedM100:
         self._wind = disturbance.wind(self.preset.step)
         self._commands = disturbance.command
         self._vicon = disturbance.vicon
-        sensors = disturbance.sensors
-        if sensors is not None and disturbance.parameters.sensors.position.drift > 0.0:
-            self._drift = lambda: sensors.drift
+        if disturbance.parameters.sensors.position.drift > 0.0:
+            self._navigation = disturbance.sensors

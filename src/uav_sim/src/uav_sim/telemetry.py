@@ -180,12 +180,13 @@ class Telemetry:
             self._pending.extend(Packet(topic, received, value) for topic, value in values)
             return
         pending = self._pending
+        newest = pending[-1].t if pending else received
         for arrival, topic, value in self.link.arrivals(received, values):
-            packet = Packet(topic, arrival, value)
-            if not pending or pending[-1].t <= arrival:
-                pending.append(packet)
+            if arrival >= newest:
+                newest = arrival
+                pending.append(Packet(topic, arrival, value))
             else:
-                insert(pending, packet, when=1)
+                insert(pending, Packet(topic, arrival, value), when=1)
 
     def due(self, t: float) -> List[Packet]:
         """Return the packets received until ``t`` [s], oldest first."""

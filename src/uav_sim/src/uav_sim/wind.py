@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Wind: a constant mean and Dryden gusts of low altitude.
 
-Interface: ``Wind(parameters, seed, step)``; ``advance(height, velocity)`` once per plant step
-returns the air's velocity (3,) [m/s] in the world frame; ``mean`` is its constant part.
+Interface: ``Wind(parameters, seed, step)``; ``advance(height, velocity)`` once per ``steps`` plant
+steps returns the air's velocity (3,) [m/s] in the world frame; ``mean`` is its constant part.
 
 Spectra, scale lengths and intensities of MIL-F-8785C, section 3.7 (below 1000 ft); those of
 MIL-HDBK-1797 are the same functions, with L_v and L_w defined as half as long. The gust is a frozen
@@ -83,11 +83,9 @@ class Wind:
         self._cos, self._sin = math.cos(direction), math.sin(direction)
         self.mean: Vector = (p.speed * self._cos, p.speed * self._sin, 0.0)  # [m/s]
         self._draw = normals(seed)
-        self._steps = max(1, round(p.period / step))
-        self._period = self._steps * step
-        self._count = 0
+        self.steps = max(1, round(p.period / step))  # of the plant for which a value is held
+        self._period = self.steps * step
         self._gusty = p.gusts != GustSigma(0.0)
-        self._now = self.mean
         # Normalised filter states, begun as after a long time: u of unit variance, and for v and w
         # a pair (p, q) with p' = -p / T + noise and q' = (p - q) / T, so that the variance of q and
         # the covariance are 1/2.
@@ -95,16 +93,13 @@ class Wind:
         self._v, self._w = self._pair(), self._pair()
 
     def advance(self, height: float, velocity: Vector) -> Vector:
-        """Return the air's velocity (3,) [m/s] for the next step.
+        """Return the air's velocity (3,) [m/s] for the next ``steps`` steps.
 
         Args:
             height: of the aircraft above ground [m].
             velocity: of the aircraft (3,) [m/s], world frame.
         """
-        if self._gusty and self._count % self._steps == 0:
-            self._now = self._gust(height, velocity)
-        self._count += 1
-        return self._now
+        return self._gust(height, velocity) if self._gusty else self.mean
 
     def _gust(self, height: float, velocity: Vector) -> Vector:
         """Advance the filters by one period, exactly for constant coefficients."""
