@@ -14,6 +14,7 @@ from uav_sim.faults.kinds import KINDS
 from uav_sim.faults.schedule import load_fault_file, load_faults
 from uav_sim.m100 import SimulatedM100
 from uav_sim.preset import load_preset
+from uav_sim.telemetry import Packet
 from uav_sim.world import World
 
 FILE = """
@@ -101,6 +102,17 @@ def test_late_messages_come_at_once_when_the_delay_ends():
     sim.faults.clear()
     first = sim.step()
     assert len([p for p in first if p.topic == "attitude"]) >= 50
+
+
+def test_what_is_sensed_is_no_part_of_the_link_and_keeps_its_time():
+    sim = aircraft(level="none")
+    sim.faults.apply("topic_dropped", topic="all")
+    seen = [Packet("obstacles", 0.0, ()), Packet("vicon", 0.0, ()), Packet("imu", 0.0, ())]
+    assert [p.topic for p in sim.faults.filter(0.0, seen)] == ["obstacles", "vicon"]
+    sim.faults.apply("topic_delayed", topic="obstacles", delay=0.3)
+    assert [p.topic for p in sim.faults.filter(0.0, seen)] == ["vicon"]
+    assert sim.faults.filter(0.29, []) == []
+    assert sim.faults.filter(0.3, []) == [Packet("obstacles", 0.0, ())]
 
 
 def test_a_gust_rises_and_falls_like_a_cosine():

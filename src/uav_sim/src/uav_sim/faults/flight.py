@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Dict, List, Tuple
 
 from uav_sim.faults.base import Context, Fault
-from uav_sim.faults.topics import shifted
+from uav_sim.faults.values import shifted
 from uav_sim.plant import Vector
 from uav_sim.telemetry import Packet
 

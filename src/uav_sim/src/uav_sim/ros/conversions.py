@@ -113,9 +113,11 @@ TELEMETRY: Dict[str, Kind] = {
 }
 
 
-def truth_to_odometry(stamp: rospy.Time, truth: Truth, frame_id: str) -> Odometry:
-    """Return the true pose in the world, and the true twist in ``base_link`` axes."""
-    message = Odometry(header=Header(0, stamp, frame_id), child_frame_id="base_link")
+def truth_to_odometry(
+    stamp: rospy.Time, truth: Truth, frame_id: str, child_frame_id: str = "base_link"
+) -> Odometry:
+    """Return the true pose in the world, and the true twist in axes of the body."""
+    message = Odometry(header=Header(0, stamp, frame_id), child_frame_id=child_frame_id)
     message.pose.pose.position = Point(*truth.position)
     message.pose.pose.orientation = Quaternion(*quaternion(*truth.rpy))
     message.twist.twist.linear = Vector3(*to_body(truth.rpy, truth.velocity))

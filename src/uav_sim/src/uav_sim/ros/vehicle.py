@@ -54,6 +54,7 @@ class Vehicle:
         self._frame_id = frame_id
         self._prefix = f"{namespace}: " if namespace else ""
         ports = Ports(namespace)
+        self._body_frame = ports.name("base_link")
         self._vicon_frame = ports.name(vicon_frame)
         self._samples = 0  # of ground truth
         self._phase = sim.phase
@@ -94,7 +95,8 @@ class Vehicle:
             if packet.topic in self._publish:
                 self._publish[packet.topic](stamp, packet)
         if self._fleet.in_phase:
-            self._truth.publish(truth_to_odometry(stamp, sim.truth, self._frame_id))
+            truth = truth_to_odometry(stamp, sim.truth, self._frame_id, self._body_frame)
+            self._truth.publish(truth)
             if self._has_obstacles and self._shows_obstacles:
                 states = obstacles_to_msg(stamp, sim.world.states(), self._frame_id)
                 self._true_obstacles.publish(states)
