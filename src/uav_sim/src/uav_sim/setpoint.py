@@ -5,12 +5,10 @@ A decoded setpoint is in the flight controller's convention: degrees, forward-ri
 yaw clockwise from north, up positive.
 """
 
-import dataclasses
 import enum
 import functools
 import math
-from dataclasses import dataclass
-from typing import List, Sequence, Tuple
+from typing import List, NamedTuple, Sequence, Tuple
 
 from uav_sim.errors import SetpointError
 from uav_sim.plant import limit_norm
@@ -57,8 +55,7 @@ class Frame(enum.IntEnum):
     BODY = 0x02
 
 
-@dataclass(frozen=True)
-class Setpoint:
+class Setpoint(NamedTuple):
     """One setpoint in the flight controller's convention."""
 
     horizontal: Horizontal
@@ -74,7 +71,7 @@ class Setpoint:
     @property
     def modes(self) -> Tuple[Horizontal, Vertical, Yaw, Frame, bool]:
         """The control byte in its parts."""
-        return self.horizontal, self.vertical, self.yaw_mode, self.frame, self.stable
+        return self[:5]
 
     @property
     def words(self) -> str:
@@ -166,7 +163,7 @@ def limited(setpoint: Setpoint, limits: Limits, tilt_limit: float) -> Tuple[Setp
         yaw = _clamp(words, "yaw rate", yaw, -bound, bound, "deg/s")
     if not words:
         return setpoint, ""
-    return dataclasses.replace(setpoint, x=x, y=y, z=z, yaw=yaw), ", ".join(words)
+    return setpoint._replace(x=x, y=y, z=z, yaw=yaw), ", ".join(words)
 
 
 def _shorten(

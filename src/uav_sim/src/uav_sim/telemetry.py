@@ -6,6 +6,7 @@ Order, rates, frames, units, signs follow doc/dji_sdk.md section 2; a packet is 
 
 import math
 from collections import deque
+from math import cos, sin
 from typing import Any, Deque, List, NamedTuple, Optional, Tuple
 
 from uav_sim.link import TelemetryLink, insert
@@ -37,32 +38,32 @@ class Imu(NamedTuple):
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Tuple[float, float, float, float]:
     """Return x, y, z, w of roll, pitch, yaw [rad] about x, y, z."""
-    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
-    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
-    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
-    return (
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    )
+    roll, pitch, yaw = 0.5 * roll, 0.5 * pitch, 0.5 * yaw
+    cr, sr, cp, sp, cy, sy = cos(roll), sin(roll), cos(pitch), sin(pitch), cos(yaw), sin(yaw)
+    cc, ss, cs, sc = cr * cp, sr * sp, cr * sp, sr * cp
+    return (sc * cy - cs * sy, cs * cy + sc * sy, cc * sy - ss * cy, cc * cy + ss * sy)
 
 
 def body_rates(rpy: Vector, rpy_rates: Vector) -> Vector:
     """Return the angular velocity (3,) [rad/s] in body axes from Euler angles and their rates."""
-    (roll, pitch, _), (d_roll, d_pitch, d_yaw) = rpy, rpy_rates
-    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    return (d_roll - d_yaw * sp, d_pitch * cr + d_yaw * cp * sr, d_yaw * cp * cr - d_pitch * sr)
+    return body_motion(rpy, rpy_rates, (0.0, 0.0, 0.0))[0]
 
 
 def to_body(rpy: Vector, vector: Vector) -> Vector:
     """Return a world vector (3,) in body axes."""
-    (roll, pitch, yaw), (x, y, z) = rpy, vector
-    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    cy, sy = math.cos(yaw), math.sin(yaw)
+    return body_motion(rpy, (0.0, 0.0, 0.0), vector)[1]
+
+
+def body_motion(rpy: Vector, rpy_rates: Vector, vector: Vector) -> Tuple[Vector, Vector]:
+    """Return angular velocity (3,) [rad/s] and a world vector (3,), both in body axes."""
+    (roll, pitch, yaw), (d_roll, d_pitch, d_yaw), (x, y, z) = rpy, rpy_rates, vector
+    cr, sr, cp, sp, cy, sy = cos(roll), sin(roll), cos(pitch), sin(pitch), cos(yaw), sin(yaw)
+    upright = d_yaw * cp
+    rates = (d_roll - d_yaw * sp, d_pitch * cr + upright * sr, upright * cr - d_pitch * sr)
     ahead, left = cy * x + sy * y, cy * y - sy * x
     down_tilted = sp * ahead + cp * z
-    return (cp * ahead - sp * z, cr * left + sr * down_tilted, cr * down_tilted - sr * left)
+    turned = (cp * ahead - sp * z, cr * left + sr * down_tilted, cr * down_tilted - sr * left)
+    return rates, turned
 
 
 class LocalFrame:
@@ -106,6 +107,7 @@ class Telemetry:
         self._plant = plant
         self._delay = plant.preset.delay.telemetry
         self._velocity_z_sign = plant.preset.flight_controller.undocumented.velocity_z_sign
+        self._gravity = plant.preset.gravity
         self._scale = plant.preset.gravity_const / plant.preset.gravity
         self._count = 0
         self._pending: Deque[Packet] = deque()
@@ -148,10 +150,9 @@ class Telemetry:
         self._count += 1
         rpy = plant.rpy
         ax, ay, az = plant.acceleration
-        force = to_body(rpy, (ax, ay, az + plant.preset.gravity))
-        scale = self._scale
-        acceleration = (scale * force[0], scale * force[1], scale * force[2])
-        rates, sensors = body_rates(rpy, plant.rpy_rates), self.sensors
+        scale, sensors = self._scale, self.sensors
+        force = (scale * ax, scale * ay, scale * (az + self._gravity))
+        rates, acceleration = body_motion(rpy, plant.rpy_rates, force)
         if sensors is not None:
             rpy, rates, acceleration = sensors.inertial(rpy, rates, acceleration)
         attitude = quaternion(*rpy)
@@ -177,7 +178,7 @@ class Telemetry:
             values += [("flight_status", flight_status), ("gimbal_angle", gimbal)]
         received = t + self._delay
         if self.link is None:
-            self._pending.extend(Packet(topic, received, value) for topic, value in values)
+            self._pending.extend([Packet(topic, received, value) for topic, value in values])
             return
         pending = self._pending
         newest = pending[-1].t if pending else received
