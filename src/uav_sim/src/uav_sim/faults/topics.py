@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Deque, Dict, List, Tuple
 
 from uav_sim.faults.base import Context, Fault
-from uav_sim.faults.values import map_numbers, shifted
+from uav_sim.faults.values import BYTES, map_numbers, shifted
 from uav_sim.telemetry import Packet
 
 ALL = "all"
@@ -23,7 +23,7 @@ NUMBERS = (
     "battery_state",
     "gimbal_angle",
 )
-TELEMETRY = (*NUMBERS, "gps_health", "flight_status")
+TELEMETRY = (*NUMBERS, *BYTES)
 SURROUNDINGS = ("obstacles", "scan", "vicon")  # not of dji_sdk; they can be late or missing too
 TOPICS = (ALL, *TELEMETRY, *SURROUNDINGS)
 

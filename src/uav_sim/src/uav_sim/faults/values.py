@@ -9,12 +9,13 @@ from uav_sim.plant import Vector
 from uav_sim.preset import GeoPoint
 from uav_sim.telemetry import EARTH_RADIUS, quaternion
 
+BYTES = ("gps_health", "flight_status")  # topics of whole numbers
 _BYTE = 255
 
 
 def map_numbers(value: Any, change: Callable[[float], float]) -> Any:
-    """Return a packet's value with every floating point number changed."""
-    if isinstance(value, float):
+    """Return a packet's value with every number changed."""
+    if isinstance(value, (int, float)):
         return change(value)
     if isinstance(value, tuple):
         parts = [map_numbers(part, change) for part in value]
@@ -41,7 +42,7 @@ def shifted(topic: str, value: Any, offset: Vector) -> Any:
             value.longitude + math.degrees(offset[0] / circle),
             value.altitude + offset[2],
         )
-    if isinstance(value, int):
+    if topic in BYTES:
         return min(max(value + round(offset[0]), 0), _BYTE)
     if isinstance(value, tuple):
         return _sum(value[:3], offset) + tuple(value[3:])
