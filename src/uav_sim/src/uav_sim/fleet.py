@@ -12,8 +12,9 @@ from uav_sim.faults.schedule import FaultLine
 from uav_sim.laser import Laser, load_laser
 from uav_sim.m100 import SimulatedM100
 from uav_sim.plant import Vector
-from uav_sim.preset import PACKET_PERIOD, load_preset
+from uav_sim.preset import PACKET_PERIOD
 from uav_sim.scene import Scene
+from uav_sim.spread import any_preset
 from uav_sim.telemetry import Packet
 from uav_sim.world import World
 
@@ -136,7 +137,7 @@ def make_fleet(
     vehicles: Dict[str, SimulatedM100] = {}
     for i, entry in enumerate(entries):
         key, preset_name = f"vehicles[{i}]", entry.preset or settings.preset
-        preset = load_preset(preset_name, settings.changes, settings.source)
+        preset = any_preset(preset_name, settings.changes, settings.source)
         for other, vehicle in zip(entries, vehicles.values()):
             gap = math.dist(entry.spawn, other.spawn) - preset.radius - vehicle.preset.radius
             if gap <= 0.0:

@@ -32,7 +32,8 @@ from uav_sim.closed_loop.flight_record import record_of, world_of
 from uav_sim.closed_loop.loop import ClosedLoop, NoFlightError, fly
 from uav_sim.disturbance import Disturbance, disturbance_names, load_disturbance
 from uav_sim.errors import SimulatorError
-from uav_sim.preset import load_preset, preset_names
+from uav_sim.preset import preset_names
+from uav_sim.spread import any_preset
 from uav_sim.world import World
 
 _PAPER = "paper"
@@ -116,7 +117,7 @@ def new_loop(
     """
     world = world or world_of(scenario, parameters.vehicle.radius)
     guard = load_guard_parameters()
-    return ClosedLoop(load_preset(plant), world, parameters, guard, disturbance)
+    return ClosedLoop(any_preset(plant), world, parameters, guard, disturbance)
 
 
 def _world(options: argparse.Namespace, scenario: Scenario, radius: float) -> World:
@@ -137,7 +138,7 @@ def _prepare(options: argparse.Namespace) -> Tuple[Scenario, Parameters]:
             else None
         )
     scenario = load_scenario(options.scenario, variant=variant)
-    load_preset(options.plant)
+    any_preset(options.plant)
     parameters = load_parameters(
         options.vehicle or options.plant, options.weights or scenario.weights
     )
@@ -162,8 +163,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--plant",
         default="dji_hil",
-        choices=preset_names(),
-        help="simulated aircraft (default: %(default)s)",
+        help=f"simulated aircraft: {', '.join(preset_names())}, or spread:SEED with --vehicle"
+        " (default: %(default)s)",
     )
     parser.add_argument("--vehicle", help="the controller's model of it (default: as the plant)")
     parser.add_argument("--variant", help="variant of the scenario")

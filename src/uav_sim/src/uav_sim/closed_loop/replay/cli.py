@@ -16,7 +16,8 @@ from uav_sim.closed_loop.replay.figure import write_figure
 from uav_sim.closed_loop.replay.recorded import read_recorded
 from uav_sim.closed_loop.replay.replay import LONG, Replay, replay
 from uav_sim.errors import SimulatorError
-from uav_sim.preset import load_preset, preset_names
+from uav_sim.preset import preset_names
+from uav_sim.spread import any_preset
 
 PROGRAM = "replay"
 _ERRORS = Console(stderr=True)
@@ -35,7 +36,7 @@ def main(argv: Optional[Sequence[str]] = None) -> None:
     try:
         recorded = read_recorded(options.bag, options.namespace, _progress)
         result = replay(
-            recorded, load_preset(options.plant), options.start, options.end, options.attitude_scale
+            recorded, any_preset(options.plant), options.start, options.end, options.attitude_scale
         )
         figures = {"bag": options.bag.name, **result.figures()}
         _write(options, result, figures)
@@ -100,7 +101,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("bag", type=Path, metavar="BAG", help="a recorded flight, ROS 1")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures as JSON")
     parser.add_argument(
-        "--plant", default="dji_hil", choices=preset_names(), help="preset (default: %(default)s)"
+        "--plant",
+        default="dji_hil",
+        metavar="NAME",
+        help=f"{', '.join(preset_names())} or spread:SEED (default: %(default)s)",
     )
     parser.add_argument(
         "--figure",
