@@ -2,9 +2,18 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.signal import welch
 
-from uav_sim.wind import GustLevel, GustSigma, Wind, WindParameters, intensities, scale_lengths
+from uav_sim.wind import (
+    GustLevel,
+    GustSigma,
+    Wind,
+    WindParameters,
+    intensities,
+    lag_pair,
+    scale_lengths,
+)
 
 FOOT = 0.3048
 
@@ -84,6 +93,18 @@ def test_spectrum_is_that_of_the_specification():
         band = (f >= low) & (f < high)
         ratio = power[band].mean(axis=0) / expected[band].mean(axis=0)
         assert ratio == pytest.approx([1.0] * 3, rel=0.25), (low, high)
+
+
+@pytest.mark.parametrize("r", [0.01, 0.3, 2.0])
+def test_filter_of_v_and_w_is_exact_over_any_step(r):
+    """Van Loan's integral of the noise of p' = -p + sqrt(2) w, q' = p - q."""
+    A, G = np.array([[-1.0, 0.0], [1.0, -1.0]]), np.diag([2.0, 0.0])
+    big = expm(np.block([[-A, G], [np.zeros((2, 2)), A.T]]) * r)
+    step = big[2:, 2:].T
+    noise = step @ big[:2, 2:]
+    a, b, pp, pq, qq = lag_pair(r)
+    assert np.array([[a, 0.0], [b, a]]) == pytest.approx(step)
+    assert np.array([[pp, pq], [pq, qq]]) == pytest.approx(noise, abs=1e-12)
 
 
 def test_mean_wind_blows_where_it_should():

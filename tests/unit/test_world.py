@@ -166,6 +166,29 @@ def test_between_distant_samples_curves_are_judged_to_a_millimetre_and_never_too
     assert least - 0.5 - 1e-3 <= world.clearance["ball"] <= least - 0.5 + 1e-6
 
 
+@pytest.mark.parametrize("angle", [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+def test_the_bulge_of_a_curve_beyond_its_chords_counts(angle):
+    """The nearest point of the orbit lies between two samples, where its chord is farther off."""
+    entry = {
+        **SPHERE,
+        "position": [5.0 * math.cos(angle), -5.0 * math.sin(angle), 5.0],
+        "motion": {"type": "circle", "center": [0.0, 0.0], "speed": 2.0},
+    }
+    world = fly(World.from_list([entry], 0.5), *[(8.0, 0.0, 5.0)] * 2, dt=5.0 * angle)
+    assert 1.5 - 1e-3 <= world.clearance["ball"] <= 1.5 + 1e-9
+
+
+def test_a_chase_is_the_same_in_long_and_in_short_steps():
+    entry = {**SPHERE, "motion": {"type": "chase", "speed": 2.0, "acceleration": 1.0}}
+    places = []
+    for count in (4, 400):
+        world = World.from_list([entry], 0.1)
+        for k in range(count + 1):
+            world.observe(4.0 * k / count, (8.0, 3.0 * k / count, 5.0))
+        places.append(world.states()[0].position)
+    assert places[0] == pytest.approx(places[1], abs=0.02)
+
+
 def test_a_body_that_turns_round_between_two_samples_hits_where_it_turns():
     entry = dict(
         SPHERE,

@@ -126,16 +126,24 @@ class Wind:
         return p, 0.5 * p + 0.5 * self._draw()
 
     def _filtered(self, pair: Tuple[float, float], r: float) -> Tuple[float, float]:
-        """Return (p, q) after ``r`` time constants; the noise keeps their covariance."""
+        """Return (p, q) after ``r`` time constants."""
         p, q = pair
-        a = math.exp(-r)
-        b, a2 = r * a, a * a
-        pp, pq = 1.0 - a2, 0.5 - a2 * (r + 0.5)
-        qq = 0.5 - a2 * (r * r + r + 0.5)
+        a, b, pp, pq, qq = lag_pair(r)
         root = math.sqrt(pp)
         rest = math.sqrt(max(qq - pq * pq / pp, 0.0))
         n1, n2 = self._draw(), self._draw()
         return a * p + root * n1, a * q + b * p + pq / root * n1 + rest * n2
+
+
+def lag_pair(r: float) -> Tuple[float, float, float, float, float]:
+    """Return how two equal lags in a row, driven by noise, go on over ``r`` time constants.
+
+    p' = a p + noise, q' = a q + b p + noise; a, b, then variance, covariance and variance of the
+    two noises, which keep the stationary covariance ((1, 1/2), (1/2, 1/2)) of p and q.
+    """
+    a = math.exp(-r)
+    a2 = a * a
+    return a, r * a, 1.0 - a2, 0.5 - a2 * (r + 0.5), 0.5 - a2 * (r * r + r + 0.5)
 
 
 def _output(pair: Tuple[float, float]) -> float:
