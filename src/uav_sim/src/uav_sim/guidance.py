@@ -2,7 +2,7 @@
 """From setpoints and sticks to attitude, thrust and yaw rate commands of the plant."""
 
 import math
-from typing import Tuple
+from typing import Optional, Tuple
 
 from uav_sim.flight_loops import FlightLoops
 from uav_sim.plant import Plant
@@ -36,9 +36,19 @@ class Guidance:
         if not self._holds:
             self._loops.release_position()
         self._loops.release_height()
+        # What depends on no state is the same command until the next setpoint.
+        self._fixed: Optional[Command] = self.follow(0.0) if self._is_fixed(setpoint) else None
+
+    def _is_fixed(self, setpoint: Setpoint) -> bool:
+        self._fixed = None
+        is_angle = setpoint.horizontal is Horizontal.ANGLE and setpoint.frame is Frame.BODY
+        is_open_loop = setpoint.vertical is Vertical.THRUST and setpoint.yaw_mode is Yaw.RATE
+        return is_angle and is_open_loop and not self._holds
 
     def follow(self, takeoff_height: float) -> Command:
         """Return the command for the setpoint; heights count from ``takeoff_height`` [m]."""
+        if self._fixed is not None:
+            return self._fixed
         setpoint, loops = self._setpoint, self._loops
         if setpoint.vertical is Vertical.THRUST:
             percent = setpoint.z

@@ -150,25 +150,19 @@ class Plant:
         half_turn = 0.25 * self._step * (yaw_rate.value + yaw_rate.advance(yaw_rate_ref))
         psi = self.yaw + half_turn
         self.yaw = psi + half_turn
-        thrust, z = self._thrust(), self.position[2]
+        thrust, z = self._thrust_line.push(self._thrust_ref), self.position[2]
+        if self._rotors is not None:
+            thrust = self._rotors.advance(thrust)
+        self._force = thrust = thrust * self.thrust_gain * self.battery_gain
+        thrust = thrust / (self.mass_factor * self._laden) if self.motors_on else 0.0
+        if self._ground_effect is not None:
+            thrust *= self._ground_effect.gain(z)
         upright = thrust * cos(phi)
         ahead, left, up = upright * sin(theta), -thrust * sin(phi), upright * cos(theta)
         if z <= 0.0 and up <= self._gravity and self.velocity[2] <= 0.0:
             self._slide(ahead, left, up, psi)
         else:
             self._fly(ahead, left, up, psi)
-
-    def _thrust(self) -> float:
-        """Advance the rotors; return their acceleration [m/s^2] along the body's z axis."""
-        thrust = self._thrust_line.push(self._thrust_ref)
-        if self._rotors is not None:
-            thrust = self._rotors.advance(thrust)
-        self._force = thrust = thrust * self.thrust_gain * self.battery_gain
-        if not self.motors_on:
-            return 0.0
-        if self._ground_effect is not None:
-            thrust *= self._ground_effect.gain(self.position[2])
-        return thrust / (self.mass_factor * self._laden)
 
     def _fly(self, ahead: float, left: float, up: float, psi: float) -> None:
         """Advance in free air under a thrust acceleration in heading axes, by the midpoint rule."""

@@ -81,6 +81,16 @@ class LocalFrame:
         longitude = home.longitude + math.degrees(position[0] / circle)
         return GeoPoint(latitude, longitude, home.altitude + position[2])
 
+    def to_world(self, place: GeoPoint) -> Vector:
+        """Return the world position (3,) [m] of a place; inverts ``to_earth``."""
+        home = self.home
+        circle = EARTH_RADIUS * math.cos(math.radians(place.latitude))
+        return (
+            math.radians(place.longitude - home.longitude) * circle,
+            math.radians(place.latitude - home.latitude) * EARTH_RADIUS,
+            place.altitude - home.altitude,
+        )
+
     def to_local(self, place: GeoPoint) -> Vector:
         """Return east, north, up [m] of a place from the reference, as dji_sdk computes them."""
         reference = self.reference
@@ -113,6 +123,15 @@ class Telemetry:
         self._pending: Deque[Packet] = deque()
         self._place: Optional[GeoPoint] = None  # newest gps_position and gps_health received
         self._health = 0
+
+    @property
+    def origin(self) -> Vector:
+        """Where in the world (3,) [m] ``local_position`` truly counts from; without one, 0."""
+        if self.frame.reference is None:
+            return (0.0, 0.0, 0.0)
+        x, y, z = self.frame.to_world(self.frame.reference)
+        ex, ey, ez = self.sensors.reference_error if self.sensors is not None else (0.0, 0.0, 0.0)
+        return (x - ex, y - ey, z - ez)
 
     def set_local_position_reference(self, t: float) -> bool:
         """Make the newest GPS position the origin of ``local_position``; a refusal clears it."""
@@ -157,25 +176,31 @@ class Telemetry:
             rpy, rates, acceleration = sensors.inertial(rpy, rates, acceleration)
         attitude = quaternion(*rpy)
         imu = Imu(attitude, rates, acceleration)
-        values: List[Tuple[str, Any]] = [("attitude", attitude), ("imu", imu)]
-        if count % _MEDIUM == 0:
+        values: List[Tuple[str, Any]]
+        if count % _MEDIUM:
+            values = [("attitude", attitude), ("imu", imu)]
+        else:
             position, velocity = plant.position, plant.velocity
             if sensors is not None:
                 position, velocity, height = sensors.navigation(position, velocity, height)
             place = self.frame.to_earth(position)
             if sensors is not None:
                 sensors.reported(place)
-            values.insert(0, ("rc", rc))
-            values += [("gps_health", gps_health), ("gps_position", place)]
             vx, vy, vz = velocity
-            velocity = (vx, vy, self._velocity_z_sign * vz)
-            values += [("height_above_takeoff", height), ("velocity", velocity)]
-        if count % _SLOW == 0:
-            values.append(("battery_state", battery))
-        if count % _MEDIUM == 0:
-            heading = 90.0 - math.degrees(rpy[2])
-            gimbal = (0.0, 0.0, math.remainder(heading, 360.0))
-            values += [("flight_status", flight_status), ("gimbal_angle", gimbal)]
+            heading = math.remainder(90.0 - math.degrees(rpy[2]), 360.0)
+            values = [
+                ("rc", rc),
+                ("attitude", attitude),
+                ("imu", imu),
+                ("gps_health", gps_health),
+                ("gps_position", place),
+                ("height_above_takeoff", height),
+                ("velocity", (vx, vy, self._velocity_z_sign * vz)),
+                ("flight_status", flight_status),
+                ("gimbal_angle", (0.0, 0.0, heading)),
+            ]
+            if count % _SLOW == 0:
+                values.insert(-2, ("battery_state", battery))
         received = t + self._delay
         if self.link is None:
             self._pending.extend([Packet(topic, received, value) for topic, value in values])
