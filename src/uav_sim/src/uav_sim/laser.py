@@ -60,6 +60,7 @@ class Laser:
         self._scans += 1
         return True
 
+    @np.errstate(divide="ignore", invalid="ignore")  # beams beside or along a surface
     def scan(self, position: Vector, rpy: Vector, states: Sequence[BodyState]) -> np.ndarray:
         """Return ranges (n,) [m].
 
@@ -74,8 +75,7 @@ class Laser:
         beams = attitude @ self._beams
         ranges = np.full(beams.shape[1], np.inf)
         if p.sees_ground:
-            with np.errstate(divide="ignore"):
-                ranges = np.where(beams[2] < 0.0, -origin[2] / beams[2], np.inf)
+            ranges = np.where(beams[2] < 0.0, -origin[2] / beams[2], np.inf)
         for state in states:
             obstacle = state.obstacle
             offset = origin - np.asarray(state.position)
@@ -134,9 +134,8 @@ def _round(offset: np.ndarray, beams: np.ndarray, radius: float) -> Tuple[np.nda
     """Return where beams (k, n) enter and leave a ball of k dimensions about the origin."""
     a, b = (beams * beams).sum(axis=0), offset @ beams
     c = float(offset @ offset) - radius * radius
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = np.sqrt(b * b - a * c)
-        enter, leave = (-b - root) / a, (-b + root) / a
+    root = np.sqrt(b * b - a * c)
+    enter, leave = (-b - root) / a, (-b + root) / a
     parallel = a < 1e-15  # along the axis of a cylinder: inside for ever, or never
     enter = np.where(parallel, -np.inf if c < 0.0 else np.inf, enter)
     return enter, np.where(parallel, np.inf if c < 0.0 else -np.inf, leave)
@@ -144,8 +143,7 @@ def _round(offset: np.ndarray, beams: np.ndarray, radius: float) -> Tuple[np.nda
 
 def _slab(offset: float, beams: np.ndarray, half: float) -> Tuple[np.ndarray, np.ndarray]:
     """Return where beams (n,) enter and leave the slab between -half and half of one axis."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        near, far = (-half - offset) / beams, (half - offset) / beams
+    near, far = (-half - offset) / beams, (half - offset) / beams
     parallel, inside = beams == 0.0, abs(offset) < half
     enter = np.where(parallel, -np.inf if inside else np.inf, np.minimum(near, far))
     return enter, np.where(parallel, np.inf if inside else -np.inf, np.maximum(near, far))
