@@ -48,6 +48,24 @@ def test_a_meeting_is_recorded_by_both_at_the_time_of_contact():
     assert first.clearance["dji2"] == pytest.approx(0.3 - 1.0, abs=0.02)
 
 
+def test_one_that_took_off_elsewhere_senses_the_others_from_there():
+    """As its local_position counts from where it stood, so do the places of the others."""
+    both = fleet((0.0, 0.0, 0.0), (40.0, -30.0, 0.0), disturbance="outdoor", seed=5)
+    second = both.vehicles["dji2"]
+    for _ in range(100):
+        both.step()
+    assert [s.position for s in second.world.states()] == [pytest.approx((0.0, 0.0, 0.0))]
+    assert second.set_local_position_reference()
+    packets = [p for _ in range(200) for p in both.step()["dji2"]]
+    own = [p.value for p in packets if p.topic == "local_position"][-1]
+    (other,) = second.sensed_obstacles
+    seen = [b - a for a, b in zip(own, other.position)]
+    assert seen == pytest.approx([-40.0, 30.0, 0.0], abs=0.3), "but for the noise of one sample"
+    second.senses_locally = False
+    (other,) = second.sensed_obstacles
+    assert other.position == pytest.approx((0.0, 0.0, 0.0), abs=3.0)
+
+
 def test_they_share_one_clock_and_move_on_their_own():
     both = fleet((0.0, 0.0, 5.0), (4.0, 0.0, 5.0))
     first, second = both.vehicles.values()

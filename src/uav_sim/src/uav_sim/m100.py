@@ -63,6 +63,8 @@ class SimulatedM100:
         self.new_poses: List[ViconPose] = []  # received in the last step
         self.late_receipts: List[Receipt] = []  # of setpoints that arrived in the last step
         self.laser: Optional[Laser] = None  # may be set before the first step
+        # Obstacles in the frame of local_position; where there is motion capture, in the world's.
+        self.senses_locally = disturbance is None or disturbance.vicon is None
         self.new_scan: Optional[np.ndarray] = None  # (n,) [m] taken in the last step
         seed = disturbance.seed if disturbance is not None else 0
         self.faults = Faults(self, f"{seed}/{self.world.name}")
@@ -198,11 +200,19 @@ class SimulatedM100:
 
     @property
     def sensed_obstacles(self) -> List[BodyState]:
-        """Obstacles as sensed from the aircraft: they share the slow error of its position."""
+        """Obstacles as sensed from the aircraft, in the frame of its ``local_position``.
+
+        They count from the same origin, where that is known, and share its slow error; with
+        ``senses_locally`` unset they stay in the world's frame.
+        """
         states, disturbance = self.world.states(), self.disturbance
-        if disturbance is None or not disturbance.shift:
+        shift = disturbance.shift if disturbance is not None else None
+        dx, dy, dz = shift or (0.0, 0.0, 0.0)
+        if self.senses_locally:
+            x, y, z = self._telemetry.origin
+            dx, dy, dz = dx - x, dy - y, dz - z
+        if dx == dy == dz == 0.0:
             return states
-        dx, dy, dz = disturbance.shift
         return [
             state._replace(position=(x + dx, y + dy, z + dz))
             for state in states

@@ -103,6 +103,11 @@ class Sensors:
         return self._position.drift
 
     @property
+    def reference_error(self) -> Vector:
+        """Error (3,) [m] of the place that became the reference of ``local_position``."""
+        return self._reference_error
+
+    @property
     def shared_shift(self) -> Vector:
         """Slow error (3,) [m] of ``local_position``: of its reference, too."""
         (x, y, z), (rx, ry, rz) = self._position.drift, self._reference_error
