@@ -54,7 +54,9 @@ class DjiSdkServer:
         ack = sim.preset.flight_controller.undocumented.activation_ack
         if ack:
             # Without activation dji_sdk's node stays up and offers nothing at all (1).
-            rospy.logerr(f"activation refused (ack {ack}): no topic and no service of dji_sdk")
+            rospy.logerr(
+                f"{ports.prefix}activation refused (ack {ack}): no topic and no service of dji_sdk"
+            )
             return
         self._services = (FlightServices(sim, lock, ports), PayloadServices(sim, ports))
         self._advertise()
@@ -95,6 +97,6 @@ class DjiSdkServer:
             self._warn(f"{name} {became}: {receipt.text}")
 
     def _warn(self, text: str) -> None:
-        line = self._throttle.line(text)
+        line = self._throttle.line(self._ports.prefix + text)
         if line:
             rospy.logwarn(line)

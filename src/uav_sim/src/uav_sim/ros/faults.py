@@ -32,7 +32,7 @@ class FaultServices:
         self._sim = sim
         self._faults: Faults = sim.faults
         self._lock = lock
-        self._prefix = f"{ports.namespace}: " if ports.namespace else ""
+        self._prefix = ports.prefix
         self._changes: Deque[str] = deque()
         self._reporting = Lock()  # services and the simulating thread report
         self._faults.on_change = self._changes.append

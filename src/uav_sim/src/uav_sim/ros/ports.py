@@ -14,6 +14,7 @@ class Ports:
 
     def __init__(self, namespace: str = "") -> None:
         self.namespace = namespace  # of the vehicle; empty: the node's own
+        self.prefix = f"{namespace}: " if namespace else ""  # of its lines in the log
         self._open: List[Any] = []
 
     def name(self, name: str) -> str:

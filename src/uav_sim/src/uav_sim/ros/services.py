@@ -42,6 +42,7 @@ class FlightServices:
     def __init__(self, sim: SimulatedM100, lock: Lock, ports: Ports) -> None:
         self._sim = sim
         self._lock = lock
+        self._prefix = ports.prefix
         for name, service, handler in (
             ("sdk_control_authority", SDKControlAuthority, self._on_authority),
             ("drone_arm_control", DroneArmControl, self._on_arm),
@@ -57,7 +58,7 @@ class FlightServices:
             ack = self._sim.control_authority(bool(request.control_enable))
         word = "obtain" if request.control_enable else "release"
         words = _AUTHORITY.get(ack.ack_data, "refused")
-        rospy.loginfo(f"{word} control authority: {words} (ack {ack.ack_data})")
+        self._say(f"{word} control authority: {words} (ack {ack.ack_data})")
         return SDKControlAuthorityResponse(*ack)
 
     def _on_arm(self, request: Any) -> DroneArmControlResponse:
@@ -65,7 +66,7 @@ class FlightServices:
             ack = self._sim.arm(bool(request.arm))
             refusal = self._sim.autopilot.refusal
         words = f"refused, {refusal}" if refusal else "done"
-        rospy.loginfo(f"{'start' if request.arm else 'stop'} motors: {words} (ack {ack.ack_data})")
+        self._say(f"{'start' if request.arm else 'stop'} motors: {words} (ack {ack.ack_data})")
         return DroneArmControlResponse(*ack)
 
     def _on_task(self, request: Any) -> DroneTaskControlResponse:
@@ -73,13 +74,13 @@ class FlightServices:
             ack = self._sim.task(request.task)
             refusal = self._sim.autopilot.refusal
         words = f"refused, {refusal}" if refusal else "started"
-        rospy.loginfo(f"task {request.task}: {words} (ack {ack.ack_data})")
+        self._say(f"task {request.task}: {words} (ack {ack.ack_data})")
         return DroneTaskControlResponse(*ack)
 
     def _on_reference(self, request: Any) -> SetLocalPosRefResponse:
         with self._lock:
             result = self._sim.set_local_position_reference()
-        rospy.loginfo(f"local position reference {'set' if result else 'refused and cleared'}")
+        self._say(f"local position reference {'set' if result else 'refused and cleared'}")
         return SetLocalPosRefResponse(result)
 
     def _on_activation(self, request: Any) -> ActivationResponse:
@@ -88,3 +89,6 @@ class FlightServices:
 
     def _on_version(self, request: Any) -> QueryDroneVersionResponse:
         return QueryDroneVersionResponse(FIRMWARE, "M100")
+
+    def _say(self, text: str) -> None:
+        rospy.loginfo(self._prefix + text)

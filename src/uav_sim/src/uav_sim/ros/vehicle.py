@@ -52,8 +52,8 @@ class Vehicle:
         self._sim = sim
         self._fleet = fleet
         self._frame_id = frame_id
-        self._prefix = f"{namespace}: " if namespace else ""
         ports = Ports(namespace)
+        self._prefix = ports.prefix
         self._body_frame = ports.name("base_link")
         self._vicon_frame = ports.name(vicon_frame)
         self._samples = 0  # of ground truth
