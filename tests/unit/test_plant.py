@@ -182,6 +182,14 @@ def test_tilt_is_limited_as_a_vector():
     assert plant.rpy[:2] == pytest.approx((limit, -limit), abs=1e-6)
 
 
+def test_each_angle_is_limited_before_the_vector_is():
+    plant = airborne()
+    plant.command(0.9, -0.3, plant.hover_percent, 0.0)
+    run(plant, 3.0)
+    scale = 1.033 * 0.605 / math.hypot(0.611, 0.3)
+    assert plant.rpy[:2] == pytest.approx((scale * 0.611, scale * -0.3), abs=1e-6)
+
+
 def test_signs_of_tilt_and_yaw_rate():
     right, ahead, left_turn = airborne(), airborne(), airborne()
     right.command(0.1, 0.0, right.hover_percent, 0.0)

@@ -24,6 +24,11 @@ def limit_norm(x: float, y: float, limit: float) -> Tuple[float, float]:
     return x * limit / norm, y * limit / norm
 
 
+def limit_tilt(x: float, y: float, angle: float, limit: float) -> Tuple[float, float]:
+    """Return roll and pitch, each limited to ``angle``, then both as a vector to ``limit``."""
+    return limit_norm(min(max(x, -angle), angle), min(max(y, -angle), angle), limit)
+
+
 class Plant:
     """Rigid body that follows attitude, thrust and yaw rate commands as identified.
 
@@ -129,7 +134,8 @@ class Plant:
         if command == self._command:
             return
         self._command = command
-        self._roll_ref, self._pitch_ref = limit_norm(roll, pitch, self.preset.tilt_limit)
+        angle = self.preset.flight_controller.limits.angle
+        self._roll_ref, self._pitch_ref = limit_tilt(roll, pitch, angle, self.preset.tilt_limit)
         self._thrust_ref = self.preset.thrust.acceleration(percent)
         self._yaw_rate_ref = yaw_rate
 

@@ -106,6 +106,7 @@ class Delay:
 class Limits:
     """Range of setpoints that the flight controller follows, beside the tilt limit."""
 
+    angle: float = _number()  # [rad] of roll and of pitch, before the vector is limited
     yaw_rate: float = _number()  # [rad/s]
     thrust_min: float = _number(0.0, 100.0)  # [percent]
     thrust_max: float = _number(0.0, 100.0)  # [percent]

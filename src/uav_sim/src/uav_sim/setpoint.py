@@ -11,7 +11,7 @@ import math
 from typing import List, NamedTuple, Sequence, Tuple
 
 from uav_sim.errors import SetpointError
-from uav_sim.plant import limit_norm
+from uav_sim.plant import limit_norm, limit_tilt
 from uav_sim.preset import Limits
 
 ROUNDING = 1e-5
@@ -148,7 +148,9 @@ def limited(setpoint: Setpoint, limits: Limits, tilt_limit: float) -> Tuple[Setp
     x, y, z, yaw = setpoint.x, setpoint.y, setpoint.z, setpoint.yaw
     words: List[str] = []
     if setpoint.horizontal is Horizontal.ANGLE:
-        x, y = _shorten(words, "tilt", x, y, math.degrees(tilt_limit), "deg")
+        angle, bound = math.degrees(limits.angle), math.degrees(tilt_limit)
+        _note(words, "tilt", math.hypot(x, y), 0.0, bound, "deg")
+        x, y = limit_tilt(x, y, angle, bound)
     elif setpoint.horizontal is Horizontal.VELOCITY:
         x, y = _shorten(words, "horizontal velocity", x, y, limits.horizontal_velocity, "m/s")
     if setpoint.vertical is Vertical.VELOCITY:
