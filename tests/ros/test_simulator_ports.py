@@ -24,6 +24,8 @@ ORDER = [
 class Ports:
     """Keeps what was opened, and what was published in its order."""
 
+    prefix = ""
+
     def __init__(self):
         self.queues, self.latched, self.callbacks, self.sent = {}, [], {}, []
 

@@ -102,10 +102,11 @@ class Faults:
         if duration != math.inf and number(duration, source, "duration", 0.0) == 0.0:
             raise ConfigError(source, "duration", duration, "more than 0 s, or none")
         fault = make_fault(kind, parameters, source)
+        self._count += 1
+        id = id or f"{kind}_{self._count}"
         if any(entry.id == id for entry in (*self._active, *self._pending)):
             raise ConfigError(source, "id", id, "an id that no other fault has")
-        self._count += 1
-        entry = Entry(id or f"{kind}_{self._count}", kind, fault, since, since + duration)
+        entry = Entry(id, kind, fault, since, since + duration)
         if since > t:
             self._pending.append(entry)
             self._pending.sort(key=lambda e: e.since)
