@@ -18,6 +18,9 @@ EARTH_RADIUS = 6378137.0  # [m] of dji_sdk's flat-earth conversion (2.2)
 REFERENCE_GPS = 3  # set_local_pos_ref needs a gps_health above this (section 4)
 
 _MEDIUM, _SLOW = 2, 10  # packets from one sending to the next: 50 and 10 Hz
+_INERTIAL = 2  # values in a packet that says nothing of positions
+
+Values = List[Tuple[str, Any]]  # topic and value
 
 
 class Packet(NamedTuple):
@@ -120,7 +123,7 @@ class Telemetry:
         self._gravity = plant.preset.gravity
         self._scale = plant.preset.gravity_const / plant.preset.gravity
         self._count = 0
-        self._pending: Deque[Packet] = deque()
+        self._pending: Deque[Tuple[float, Values]] = deque()  # when they arrive [s], what
         self._place: Optional[GeoPoint] = None  # newest gps_position and gps_health received
         self._health = 0
 
@@ -176,7 +179,7 @@ class Telemetry:
             rpy, rates, acceleration = sensors.inertial(rpy, rates, acceleration)
         attitude = quaternion(*rpy)
         imu = Imu(attitude, rates, acceleration)
-        values: List[Tuple[str, Any]]
+        values: Values
         if count % _MEDIUM:
             values = [("attitude", attitude), ("imu", imu)]
         else:
@@ -202,36 +205,45 @@ class Telemetry:
             if count % _SLOW == 0:
                 values.insert(-2, ("battery_state", battery))
         received = t + self._delay
-        if self.link is None:
-            self._pending.extend([Packet(topic, received, value) for topic, value in values])
-            return
         pending = self._pending
-        newest = pending[-1].t if pending else received
+        if self.link is None:
+            pending.append((received, values))
+            return
+        newest = pending[-1][0] if pending else received
         for arrival, topic, value in self.link.arrivals(received, values):
+            part = (arrival, [(topic, value)])
             if arrival >= newest:
                 newest = arrival
-                pending.append(Packet(topic, arrival, value))
+                pending.append(part)
             else:
-                insert(pending, Packet(topic, arrival, value), when=1)
+                insert(pending, part)
 
     def due(self, t: float) -> List[Packet]:
         """Return the packets received until ``t`` [s], oldest first."""
-        pending, packets = self._pending, []
-        while pending and pending[0].t <= t + 1e-9:
-            packet = pending.popleft()
-            packets.append(packet)
-            if packet.topic == "gps_health":
-                self._health = packet.value
-            elif packet.topic == "gps_position":
-                self._place = packet.value
-                # The node computes it on receipt: a reference counts from the next packet on.
-                if self.frame.reference is not None:
-                    local = self.frame.to_local(packet.value)
-                    packets.append(Packet("local_position", packet.t, local))
+        pending, packets, limit = self._pending, [], t + 1e-9
+        while pending and pending[0][0] <= limit:
+            received, values = pending.popleft()
+            if len(values) != _INERTIAL:
+                values = self._noted(values)
+            packets.extend([Packet(topic, received, value) for topic, value in values])
         return packets
+
+    def _noted(self, values: Values) -> Values:
+        """Return received values with the local position, which the node computes on receipt."""
+        result = []
+        for topic, value in values:
+            result.append((topic, value))
+            if topic == "gps_health":
+                self._health = value
+            elif topic == "gps_position":
+                self._place = value
+                # A reference counts from the next packet on.
+                if self.frame.reference is not None:
+                    result.append(("local_position", self.frame.to_local(value)))
+        return result
 
     def _refer(self, t: float, place: GeoPoint) -> None:
         if self.sensors is not None:
             self.sensors.refer(place)
         self.frame.reference = place
-        self._pending.appendleft(Packet("local_frame_ref", t, place))
+        self._pending.appendleft((t, [("local_frame_ref", place)]))
