@@ -69,7 +69,8 @@ class SimulatedM100:
         seed = disturbance.seed if disturbance is not None else 0
         self.faults = Faults(self, f"{seed}/{self.world.name}")
         self._telemetry = Telemetry(self.plant)
-        self._steps = 0
+        self._steps, self._step = 0, preset.step
+        self._rc_values = preset.flight_controller.rc
         self._steps_per_packet = round(PACKET_PERIOD / preset.step)
         self._steps_per_drain = round(DRAIN_PERIOD / preset.step)
         self._wind: Optional[Wind] = None
@@ -113,7 +114,7 @@ class SimulatedM100:
             self._navigate(self._navigation.drift)
         plant.step()
         self._steps += 1
-        self.t = self._steps * self.preset.step
+        self.t = self._steps * self._step
         self.world.observe(self.t, plant.position)
         if self._vicon is not None:
             self.new_poses = self._vicon.poses(self.t, plant.position, plant.rpy)
@@ -124,7 +125,7 @@ class SimulatedM100:
                 self._drain()
             self._telemetry.sample(
                 self.t,
-                rc=self.rc.axes(self.preset.flight_controller.rc),
+                rc=self.rc.axes(self._rc_values),
                 gps_health=self.autopilot.gps_health,
                 height=self.autopilot.height,
                 flight_status=self.autopilot.flight_status,
@@ -165,6 +166,10 @@ class SimulatedM100:
     def set_local_position_reference(self) -> bool:
         """Make the newest GPS position the origin of ``local_position``."""
         return not self.faults.dead and self._telemetry.set_local_position_reference(self.t)
+
+    def restart_driver(self) -> None:
+        """Start dji_sdk's node anew: it knows no reference any more."""
+        self._telemetry.frame.reference = None
 
     @property
     def battery(self) -> float:
