@@ -139,12 +139,12 @@ class Autopilot:
 
     def update(self, t: float) -> None:
         """Command the plant for the step that begins at ``t`` [s]."""
-        self._t = t
-        if self.rc.connected:
+        self._t, rc = t, self.rc
+        if rc.connected:
             self._rc_seen = t
         if self.control.update():
-            self._events.append(f"control authority lost: the RC's switch is in {self.rc.mode}")
-        if self.rc.connected and self.rc.mode != "F":
+            self._events.append(f"control authority lost: the RC's switch is in {rc.mode}")
+        if rc.connected and rc.mode != "F":
             self._hand_over(t)
         if self.low_battery.is_low:
             demand = self.low_battery.demand(self.phase, self._has_position)
@@ -153,7 +153,7 @@ class Autopilot:
                 self._enter(t, demand[0])
         if self._setpoint_time is not None:
             silence = t - self._setpoint_time
-            if silence > self._settings.cmd_timeout + 1e-9 or not self.rc.allows_sdk:
+            if silence > self._settings.cmd_timeout + 1e-9 or not rc.allows_sdk:
                 self._setpoint_time = None
                 self._events.append(f"no setpoint for {silence:.2f} s: {self._without_setpoint}")
         _BEHAVIOUR[self.phase](self, t)
