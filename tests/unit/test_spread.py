@@ -10,7 +10,7 @@ from uav_sim.preset import FirstOrder, load_preset
 from uav_sim.spread import any_preset, spread
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.integers(0, 10**9))
 def test_every_draw_lies_between_or_near_the_presets(seed):
     drawn, presets = spread(seed), [load_preset(n) for n in ("dji_hil", "eth", "paper")]
