@@ -13,7 +13,7 @@ from std_msgs.msg import String
 
 from dji_sdk.srv import SDKControlAuthority
 from nmpc_msgs.msg import ObstacleArray
-from nmpc_msgs.srv import InjectFault
+from nmpc_msgs.srv import ClearFault, InjectFault
 
 NAMES = ("dji1", "dji2")
 TOPICS = {
@@ -79,6 +79,10 @@ def main():
     }
     state = rosgraph.Master("/fleet_client").getSystemState()
     result["services"] = [name for name, _ in state[2] if name.startswith("/dji2/dji_sdk")]
+    clear = rospy.ServiceProxy("dji2/uav_sim/clear_fault", ClearFault)
+    before = second.count["dji_sdk/velocity"]
+    result["cleared"] = clear("").success
+    result["lives"] = wait(lambda: second.count["dji_sdk/velocity"] > before + 10, 5.0)
     sys.stdout.write(json.dumps(result) + "\n")
 
 

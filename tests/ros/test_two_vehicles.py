@@ -28,3 +28,4 @@ def test_two_vehicles_meet_in_one_world(ros):
     first, second = seen["after"]["dji_sdk/velocity"]
     assert first > 15 and second == 0
     assert min(seen["after"]["uav_sim/ground_truth"]) > 30, "the aircraft flies on without dji_sdk"
+    assert seen["cleared"] and seen["lives"], "dji_sdk is started again when the fault ends"

@@ -20,6 +20,9 @@ class Aircraft(Protocol):
     plant: Plant
     autopilot: Autopilot
 
+    def restart_driver(self) -> None:
+        """Start dji_sdk's node anew."""
+
 
 class Overrides:
     """Values that faults change; what they were comes back when the last such fault ends.
@@ -71,6 +74,9 @@ class Fault:
 
     def begin(self, context: Context) -> None:
         """Begin; what ``context.overrides`` was given ends by itself."""
+
+    def end(self) -> None:
+        """End; called once."""
 
     def step(self, t: float) -> None:
         """Act before the step of the aircraft that begins at ``t`` [s]."""

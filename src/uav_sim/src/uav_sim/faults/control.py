@@ -117,10 +117,19 @@ class SetpointsIgnored(Fault):
 class NodeKilled(Fault):
     """dji_sdk's node dies: no topic, no answer; the aircraft flies on without it.
 
-    Through ROS the simulator's process ends, or only this vehicle's topics and services.
+    Through ROS the simulator's process ends, or only this vehicle's topics and services. When the
+    fault ends the node is started anew.
     """
 
     what: str = field(default="process", metadata={"choices": ("process", "driver")})
+
+    def begin(self, context: Context) -> None:
+        """Die."""
+        self._aircraft: Aircraft = context.aircraft
+
+    def end(self) -> None:
+        """Start again."""
+        self._aircraft.restart_driver()
 
     def filter(self, t: float, packets: List[Packet]) -> List[Packet]:
         """Send nothing any more; what others publish goes on."""

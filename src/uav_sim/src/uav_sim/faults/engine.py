@@ -164,6 +164,7 @@ class Faults:
     def _end(self, entry: Entry, word: str) -> None:
         self._active.remove(entry)
         self._overrides.release(entry.fault)
+        entry.fault.end()
         self._blow(self._aircraft.t)
         self._late.extend(entry.fault.flush(self._aircraft.t))
         self.on_change(f"fault ends at {self._aircraft.t:.2f} s ({word}): {entry.id}")

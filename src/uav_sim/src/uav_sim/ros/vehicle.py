@@ -72,8 +72,8 @@ class Vehicle:
         }
         self._laser = LaserPort(sim.laser, ports) if sim.laser is not None else None
         self._driver_ports = Ports(namespace)
-        self._driver = DjiSdkServer(sim, lock, self._driver_ports)
-        self._driver_is_dead = False
+        self._lock = lock
+        self._start_driver()
         self._faults = FaultServices(sim, lock, ports)
 
     def surroundings(self) -> List[Packet]:
@@ -114,12 +114,20 @@ class Vehicle:
         return self._fleet.in_phase and self._samples % OBSTACLE_PERIOD == 0
 
     def report(self) -> None:
-        """Show faults that have begun or ended; end the driver if that is one of them."""
+        """Show faults that have begun or ended; end and start the driver as they say."""
         self._faults.report()
-        if self._sim.faults.dead == "driver" and not self._driver_is_dead:
-            self._driver_is_dead = True
+        is_dead = self._sim.faults.dead == "driver"
+        if is_dead and self._driver_lives:
+            self._driver_lives = False
             self._driver_ports.close()
             rospy.logerr(f"{self._prefix}dji_sdk is dead: no topic and no service any more")
+        elif not is_dead and not self._driver_lives:
+            self._start_driver()
+            rospy.logwarn(f"{self._prefix}dji_sdk is started again")
+
+    def _start_driver(self) -> None:
+        self._driver = DjiSdkServer(self._sim, self._lock, self._driver_ports)
+        self._driver_lives = True
 
     def _publish_obstacles(self, stamp: rospy.Time, packet: Packet) -> None:
         sensed = self._time_of(stamp, packet.t)
