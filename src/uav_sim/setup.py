@@ -6,7 +6,14 @@ from setuptools import setup
 
 setup(
     **generate_distutils_setup(
-        packages=["uav_sim", "uav_sim.closed_loop", "uav_sim.closed_loop.bench", "uav_sim.ros"],
+        packages=[
+            "uav_sim",
+            "uav_sim.closed_loop",
+            "uav_sim.closed_loop.bench",
+            "uav_sim.closed_loop.replay",
+            "uav_sim.faults",
+            "uav_sim.ros",
+        ],
         package_dir={"": "src"},
     )
 )

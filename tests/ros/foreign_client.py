@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""A controller that knows only dji_sdk: observes, or flies, and prints what it saw as JSON."""
+"""A client that knows only dji_sdk: observes topics, asks services, and prints JSON."""
 
 import json
+import math
 import sys
 import time
+from collections import defaultdict
 
 import rosgraph
+import roslib.message
 import rospy
+import rosservice
 from geometry_msgs.msg import PointStamped, QuaternionStamped, Vector3Stamped
 from sensor_msgs.msg import BatteryState, Imu, Joy, NavSatFix
 from std_msgs.msg import Float32, UInt8
 
+from dji_sdk.msg import Gimbal
 from dji_sdk.srv import (
+    CameraAction,
     DroneArmControl,
     DroneTaskControl,
     QueryDroneVersion,
@@ -39,32 +45,26 @@ SERVICES = {
     "set_local_pos_ref": SetLocalPosRef,
     "query_drone_version": QueryDroneVersion,
 }
-TAKE_OFF, LAND = 4, 6
 
 
 class Client:
     """Newest message and number of messages of every topic, and all services."""
 
     def __init__(self):
-        self.newest, self.count, self.statuses = {}, dict.fromkeys(TOPICS, 0), []
+        self.newest, self.count = {}, dict.fromkeys(TOPICS, 0)
+        self.by_stamp = defaultdict(set)
         for name, kind in TOPICS.items():
             rospy.Subscriber(f"dji_sdk/{name}", kind, self._on_message, name, queue_size=100)
         for name in SERVICES:
             rospy.wait_for_service(f"dji_sdk/{name}", 20.0)
         self.call = {n: rospy.ServiceProxy(f"dji_sdk/{n}", kind) for n, kind in SERVICES.items()}
-        self.setpoint = {
-            suffix: rospy.Publisher(f"dji_sdk/flight_control_setpoint_{suffix}", Joy, queue_size=10)
-            for suffix in ("generic", "ENUvelocity_yawrate")
-        }
-        self.wait(lambda: len(self.newest) == len(TOPICS) - 1, 20.0)
-        for publisher in self.setpoint.values():
-            self.wait(lambda p=publisher: p.get_num_connections() > 0, 20.0)
+        self.wait(lambda: len(self.newest) >= len(TOPICS) - 1, 20.0)
 
     def _on_message(self, message, name):
         self.newest[name] = message
         self.count[name] += 1
-        if name == "flight_status" and message.data not in self.statuses[-1:]:
-            self.statuses.append(message.data)
+        if hasattr(message, "header"):
+            self.by_stamp[message.header.stamp.to_nsec()].add(name)
 
     def wait(self, condition, timeout):
         """Return whether the condition came true within a simulated time [s]."""
@@ -74,14 +74,6 @@ class Client:
                 return True
             rospy.sleep(0.02)
         return condition()
-
-    def stream(self, suffix, axes, duration):
-        """Send a setpoint at 50 Hz."""
-        end = rospy.Time.now() + rospy.Duration(duration)
-        rate = rospy.Rate(50)
-        while rospy.Time.now() < end:
-            self.setpoint[suffix].publish(Joy(axes=axes))
-            rate.sleep()
 
     def value(self, name):
         message = self.newest[name]
@@ -95,73 +87,92 @@ def observe(client):
     reference = client.call["set_local_pos_ref"]().result
     client.wait(lambda: client.count["local_position"] > 0, 5.0)
     latched = rospy.wait_for_message("dji_sdk/local_frame_ref", NavSatFix, 5.0)
+    client.by_stamp.clear()
     begin, counted = rospy.Time.now(), dict(client.count)
     wall = time.monotonic()
     rospy.sleep(5.0)
-    elapsed = (rospy.Time.now() - begin).to_sec()
-    names = [name for name, _ in rosgraph.Master("/client").getPublishedTopics("")]
+    elapsed, wall_elapsed = (rospy.Time.now() - begin).to_sec(), time.monotonic() - wall
+    packets = sorted({tuple(sorted(names)) for names in list(client.by_stamp.values())[2:-2]})
     imu, battery = client.newest["imu"], client.newest["battery_state"]
+    position, attitude = client.newest["gps_position"], client.newest["attitude"].quaternion
     return {
-        "speed": elapsed / (time.monotonic() - wall),
+        "speed": elapsed / wall_elapsed,
         "rates": {name: (client.count[name] - counted[name]) / elapsed for name in TOPICS},
         "frames": {n: m.header.frame_id for n, m in client.newest.items() if hasattr(m, "header")},
+        "packets": packets,
         "stamp_age": (rospy.Time.now() - imu.header.stamp).to_sec(),
-        "published": [name for name in names if name.startswith("/dji_sdk/")],
+        "published": types("publishedTopics"),
+        "subscribed": types("subscribedTopics"),
+        "services": services(),
         "version": [version.version, version.hardware],
         "reference": reference,
-        "latched_latitude": latched.latitude,
-        "gps_latitude": client.newest["gps_position"].latitude,
-        "acceleration": imu.linear_acceleration.z,
-        "covariance": list(imu.angular_velocity_covariance),
+        "latched": [latched.header.frame_id, latched.header.stamp.to_sec(), latched.latitude],
+        "gps": [position.latitude, position.status.status, sum(position.position_covariance)],
+        "gps_health": client.value("gps_health"),
+        "imu": [imu.linear_acceleration.x, imu.linear_acceleration.y, imu.linear_acceleration.z],
+        "same_attitude": imu.orientation == attitude,
+        "covariances": [
+            *imu.orientation_covariance,
+            *imu.angular_velocity_covariance,
+            *imu.linear_acceleration_covariance,
+        ],
         "battery": [
             battery.percentage,
             battery.voltage,
-            battery.charge != battery.charge,
+            battery.current,
+            battery.capacity,
+            math.isnan(battery.charge) and math.isnan(battery.design_capacity),
             battery.present,
         ],
-        "rc": list(client.newest["rc"].axes),
+        "rc": [list(client.newest["rc"].axes), list(client.newest["rc"].buttons)],
         "flight_status": client.value("flight_status"),
     }
 
 
-def fly(client):
-    """Take off, fly by setpoints, send rubbish, land."""
-    call, seen = client.call, {}
-    client.setpoint["generic"].publish(Joy(axes=[0, 0, 80, 0, 43]))
-    seen["task_without_authority"] = call["drone_task_control"](TAKE_OFF).ack_data
-    seen["arm_without_authority"] = call["drone_arm_control"](1).ack_data
-    seen["reference"] = call["set_local_pos_ref"]().result
-    authority = call["sdk_control_authority"](1)
-    seen["authority"] = [authority.result, authority.cmd_set, authority.cmd_id, authority.ack_data]
-    task = call["drone_task_control"](TAKE_OFF)
-    seen["take_off"] = [task.result, task.cmd_set, task.cmd_id, task.ack_data]
-    client.wait(lambda: client.value("height_above_takeoff") > 1.1, 15.0)
-    client.wait(lambda: abs(client.value("velocity")[2]) < 0.05, 5.0)
-    client.stream("ENUvelocity_yawrate", [0.5, 1.0, 0.5, 0.0], 4.0)
-    seen["velocity"] = client.value("velocity")
-    for axes in (
-        [0.0, 0.0, 38.0, 0.0],
-        [0.0, 0.0, float("nan"), 0.0, 43.0],
-        [],
-        [0.0, 0.0, 900.0, 0.0, 43.0],
-    ):
-        client.setpoint["generic"].publish(Joy(axes=axes))
-    client.stream("generic", [0.0, 0.15, 38.4, 0.0, 43.0], 1.5)
-    seen["after_pitch"] = client.value("velocity")
-    client.wait(lambda: max(map(abs, client.value("velocity"))) < 0.05, 10.0)
-    seen["after_silence"] = client.value("velocity")
-    seen["local_position"] = client.value("local_position")
-    seen["height"] = client.value("height_above_takeoff")
-    seen["land"] = call["drone_task_control"](LAND).ack_data
-    client.wait(lambda: client.value("flight_status") == 1, 40.0)
-    seen["release"] = call["sdk_control_authority"](0).ack_data
-    seen["statuses"] = client.statuses
-    return seen
+def types(which):
+    """Types by name below dji_sdk of what the simulator publishes or subscribes to."""
+    master = rosgraph.Master("/client")
+    publishers, subscribers, _ = master.getSystemState()
+    nodes = dict(publishers if which == "publishedTopics" else subscribers)
+    return {
+        name.split("/dji_sdk/")[1]: kind
+        for name, kind in master.getTopicTypes()
+        if name.startswith("/dji_sdk/") and "/uav_sim" in nodes.get(name, [])
+    }
+
+
+def services():
+    """Types by name of all services below dji_sdk."""
+    _, _, names = rosgraph.Master("/client").getSystemState()
+    found = [name for name, _ in names if name.startswith("/dji_sdk/")]
+    return {name.split("/dji_sdk/")[1]: rosservice.get_service_type(name) for name in found}
+
+
+def ask(client):
+    """Answers of all that an M100's node offers beside flying."""
+    answers = {}
+    for name, kind in services().items():
+        cls = roslib.message.get_service_class(kind)
+        try:
+            response = rospy.ServiceProxy(f"dji_sdk/{name}", cls)(cls._request_class())
+        except rospy.ServiceException as error:
+            answers[name] = str(error)
+        else:
+            answers[name] = [getattr(response, slot) for slot in response.__slots__]
+            answers[name] = [
+                v if isinstance(v, (bool, int, float, str)) else "" for v in answers[name]
+            ]
+    gimbal = rospy.Publisher("dji_sdk/gimbal_angle_cmd", Gimbal, queue_size=10)
+    client.wait(lambda: gimbal.get_num_connections() > 0, 10.0)
+    gimbal.publish(Gimbal(yaw=30.0))
+    camera = rospy.ServiceProxy("dji_sdk/camera_action", CameraAction)
+    answers["camera"] = [camera(action).result for action in (0, 1, 2, 3)]
+    return answers
 
 
 def main():
     rospy.init_node("foreign_client")
-    result = {"observe": observe, "fly": fly}[sys.argv[1]](Client())
+    result = {"observe": observe, "ask": ask}[sys.argv[1]](Client())
     sys.stdout.write(json.dumps(result) + "\n")
 
 

@@ -112,6 +112,10 @@ class RosSession:
         number = self._processes.index(process)
         return (self.directory / f"output_{number}.txt").read_text(encoding="utf-8")
 
+    def output_of_all(self) -> str:
+        """Return all that everything started here has printed."""
+        return "\n".join(map(self.output_of, self._processes))
+
     def output(self) -> str:
         """Return the last lines of everything that was started, for a failure's text."""
         parts = []

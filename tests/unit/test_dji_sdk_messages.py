@@ -9,6 +9,8 @@ in two published copies of DJI's package (liu978079474/OSDK_ROS, groundmelon/dji
 """
 
 import importlib
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -32,6 +34,8 @@ SERVICES = {
     "CameraAction": "cffa80c600cf5ffacb2c7279944f208e",
     "DroneArmControl": "0a8071a11c3d6b34ba24869e069f733c",
     "DroneTaskControl": "ab91c4042653ca6868c5907bf22e4741",
+    "MFIOConfig": "ad06bda475c7f13453680ee626114de0",
+    "MFIOSetValue": "7a1c84fd096204723ecbb1a57b618e28",
     "MissionHpAction": "067ec5f79e77e0b4c0121e09e733b483",
     "MissionHpGetInfo": "8c08f93488e030961f6001dc630fd2c2",
     "MissionHpResetYaw": "f03b0bc279b265c40946c1011df83013",
@@ -48,7 +52,12 @@ SERVICES = {
     "SDKControlAuthority": "ab9a31a36ad499da6a1bb989580360dd",
     "SendMobileData": "1c25dff3462ed6a8f6df1c148c7b6a1e",
     "SendPayloadData": "1c25dff3462ed6a8f6df1c148c7b6a1e",
+    "SetHardSync": "11e826f14456b3511264f6a734868e08",
     "SetLocalPosRef": "eb13ac1f1354ccecb7941ee8fa2192e8",
+    "SetupCameraStream": "e0732f307563f64841a2e5c6880f32d3",
+    "Stereo240pSubscription": "c1205f3b01904555b852bb2bc5881da0",
+    "StereoDepthSubscription": "6da41f0fc9c34988dbd56e6a11bddfdf",
+    "StereoVGASubscription": "a636307470f5a4e2ecf4fbcb4aeca4ed",
 }
 
 TYPES = [("msg", *item) for item in MESSAGES.items()] + [
@@ -83,3 +92,28 @@ def test_constants_that_flights_depend_on():
     assert srv.DroneTaskControlRequest.TASK_GOHOME == 1
     assert srv.DroneTaskControlRequest.TASK_TAKEOFF == 4
     assert srv.DroneTaskControlRequest.TASK_LAND == 6
+
+
+def test_old_clients_in_cpp_find_their_header_and_its_values():
+    compiler = shutil.which("c++") or shutil.which("g++")
+    if compiler is None:
+        pytest.skip("no C++ compiler")
+    include = Path(__file__).resolve().parents[2] / "src" / "dji_sdk" / "include"
+    attitude = "HORIZONTAL_ANGLE | VERTICAL_THRUST | YAW_RATE | HORIZONTAL_BODY | STABLE_ENABLE"
+    code = f"""
+        #include <dji_sdk/dji_sdk.h>
+        using namespace DJISDK;
+        static_assert(({attitude}) == 0x2B, "");
+        static_assert((HORIZONTAL_VELOCITY | YAW_RATE | STABLE_ENABLE) == 0x49, "");
+        static_assert(DJISDK::DroneFirmwareVersion::M100_31 == 50399744, "");
+        static_assert(M100_STATUS_IN_AIR == 3 && STATUS_IN_AIR == 2, "");
+        static_assert(DisplayMode::MODE_NAVI_SDK_CTRL == 17, "");
+    """
+    done = subprocess.run(
+        [compiler, "-std=c++11", "-x", "c++", "-fsyntax-only", "-I", str(include), "-"],
+        input=code,
+        text=True,
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr

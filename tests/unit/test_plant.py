@@ -61,6 +61,55 @@ def test_thrust_gain_and_mass_scale_acceleration():
     assert plant.velocity[2] == pytest.approx(9.81 * (0.9 / 1.2 - 1.0))
 
 
+def test_payload_weighs_on_the_same_thrust():
+    plant = airborne("paper", payload=0.5)
+    assert plant.hover_percent == pytest.approx(load_preset("paper").hover_percent * 3.395 / 2.895)
+    run(plant, 1.0)
+    assert plant.velocity[2] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_rotors_lag_behind_their_command():
+    plant = airborne("eth", drag=Drag("world", 0.0, 0.0, 0.0))
+    plant.command(0.0, 0.0, plant.hover_percent + 1.0, 0.0)
+    run(plant, 1.0)
+    # a first-order lag costs its time constant of the added acceleration
+    assert plant.velocity[2] == pytest.approx(0.46748 * (1.0 - 0.05), rel=0.06)
+    sooner = airborne("eth", drag=Drag("world", 0.0, 0.0, 0.0), rotor_time_constant=0.0)
+    sooner.command(0.0, 0.0, sooner.hover_percent + 1.0, 0.0)
+    run(sooner, 1.0)
+    assert sooner.velocity[2] == pytest.approx(0.46748)
+
+
+def test_ground_effect_is_off_by_default_and_that_of_cheeseman_and_bennett():
+    effect = load_preset("dji_hil").ground_effect
+    assert effect.strength == 0.0 and effect.gain(0.0) == 1.0
+    single = dataclasses.replace(effect, strength=1.0)
+    radius = single.rotor_radius
+    at_one_radius = single.gain(radius - single.rotor_height)
+    assert single.rotor_height >= radius or at_one_radius == pytest.approx(16.0 / 15.0)
+    z = 0.5
+    expected = 1.0 / (1.0 - (radius / (4.0 * (z + single.rotor_height))) ** 2)
+    assert single.gain(z) == pytest.approx(expected)
+    low = airborne(
+        position=(0.0, 0.0, 0.1), ground_effect=dataclasses.replace(effect, strength=2.0)
+    )
+    high = airborne(ground_effect=dataclasses.replace(effect, strength=2.0))
+    run(low, 0.5)
+    run(high, 0.5)
+    assert low.velocity[2] > 0.05 and high.velocity[2] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_motion_can_be_given_while_commands_stay_under_way():
+    plant = airborne()
+    plant.command(0.2, 0.0, plant.hover_percent, 0.0)
+    run(plant, 0.05)
+    plant.set_motion((1.0, 2.0, 3.0), (0.1, -0.1, 0.5), (0.0, 0.0, 0.0))
+    assert plant.velocity == (1.0, 2.0, 3.0) and plant.rpy == (0.1, -0.1, 0.5)
+    before = plant.position
+    run(plant, 0.5)
+    assert plant.position[0] > before[0] and plant.rpy[0] == pytest.approx(0.2066, abs=0.02)
+
+
 @pytest.mark.parametrize(("yaw", "rate"), [(0.0, 0.138), (math.pi / 2, 0.125)])
 def test_speed_decays_by_drag_along_the_heading(yaw, rate):
     plant = airborne(velocity=(5.0, 0.0, 0.0), yaw=yaw)
@@ -131,6 +180,14 @@ def test_tilt_is_limited_as_a_vector():
     run(plant, 3.0)
     limit = 1.033 * 0.605 / math.sqrt(2.0)
     assert plant.rpy[:2] == pytest.approx((limit, -limit), abs=1e-6)
+
+
+def test_each_angle_is_limited_before_the_vector_is():
+    plant = airborne()
+    plant.command(0.9, -0.3, plant.hover_percent, 0.0)
+    run(plant, 3.0)
+    scale = 1.033 * 0.605 / math.hypot(0.611, 0.3)
+    assert plant.rpy[:2] == pytest.approx((scale * 0.611, scale * -0.3), abs=1e-6)
 
 
 def test_signs_of_tilt_and_yaw_rate():

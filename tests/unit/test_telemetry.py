@@ -168,7 +168,7 @@ def test_rc_axes():
 def test_battery_discharges_in_percent_with_motors_on():
     sim = hovering()
     assert latest(sim.run(0.2), "battery_state") == 100.0
-    sim.run(PRESET.flight_time / 50)
+    sim.run(PRESET.battery.flight_time / 50)
     assert latest(sim.run(0.2), "battery_state") == 98.0
     standing = SimulatedM100(PRESET)
     standing.run(5.0)

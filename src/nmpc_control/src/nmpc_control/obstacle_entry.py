@@ -24,6 +24,17 @@ class _Entry:
 
 
 @dataclass(frozen=True)
+class _Moves:
+    """How it moves: the simulator's matter; here only messages tell where a moving one goes."""
+
+    velocity: np.ndarray = field(
+        default_factory=lambda: np.zeros(3), metadata={"length": 3, "min": -_REACH, "max": _REACH}
+    )
+    motion: Any = None
+    appear: Any = None
+
+
+@dataclass(frozen=True)
 class _Sphere(_Entry):
     radius: float = _size()
 
@@ -48,11 +59,14 @@ class _Box(_Entry):
         return tuple(self.size)
 
 
+_MOVES = ("velocity", "motion", "appear")
 _SHAPES = {"sphere": _Sphere, "cylinder": _Cylinder, "box": _Box}
 
 
 def load_obstacles(data: Any, source: str) -> Tuple[Obstacle, ...]:
     """Return the obstacles of a list of mappings; None is an empty list.
+
+    Those that move are returned where they begin, those that appear later not at all.
 
     Raises:
         ConfigError: naming source, key, value and what was expected.
@@ -70,8 +84,12 @@ def load_obstacles(data: Any, source: str) -> Tuple[Obstacle, ...]:
         shape = options.pop("shape", "sphere")
         if not isinstance(shape, str) or shape not in _SHAPES:
             raise ConfigError(source, f"{key}.shape", shape, f"one of {', '.join(_SHAPES)}")
+        given = {name: options.pop(name) for name in _MOVES if name in options}
+        moves = from_dict(_Moves, given, source, key)
         entry = from_dict(_SHAPES[shape], options, source, key)
         if not entry.id or entry.id in [other.id for other in obstacles]:
             raise ConfigError(source, f"{key}.id", entry.id, "a name that no other obstacle has")
-        obstacles.append(Obstacle(entry.id, entry.position, np.array(entry.lengths()), shape))
+        if moves.appear is None:
+            size = np.array(entry.lengths())
+            obstacles.append(Obstacle(entry.id, entry.position, size, shape, moves.velocity))
     return tuple(obstacles)

@@ -5,52 +5,29 @@ Follows doc/dji_sdk.md sections 3.5, 4, 5, 9; what that page marks as open is a 
 ``common.yaml``.
 """
 
-import enum
-import math
-from typing import NamedTuple, Optional, Tuple
+from collections import deque
+from typing import Deque, List, NamedTuple, Optional
 
+from uav_sim.authority import Ack, ControlAuthority
+from uav_sim.auto_flight import AutoFlight
 from uav_sim.flight_loops import FlightLoops
 from uav_sim.guidance import Guidance
+from uav_sim.low_battery import LowBattery
+from uav_sim.phase import (
+    FLIGHT_STATUS,
+    GOOD_GPS,
+    TASK_TAKE_OFF,
+    TASKS,
+    Phase,
+    task_objection,
+)
 from uav_sim.plant import Plant
 from uav_sim.remote_control import RemoteControl
 from uav_sim.setpoint import Horizontal, Setpoint, limited
 
-GOOD_GPS = 3  # velocity and position setpoints, and position hold, need this gps_health (3.4)
-HOME_RADIUS = 0.5  # [m]
+STICK_COMMAND_TIME = 1.0  # [s] sticks held in their lower corners start the motors; assumption
+LIFT_OFF_THROTTLE = 0.1  # [1] stick above centre with which the pilot lifts off; assumption
 CARRYING = 0.9  # [1] less than this part of the hover thrust does not carry the aircraft
-TASK_GO_HOME, TASK_TAKE_OFF, TASK_LAND = 1, 4, 6
-
-
-class Phase(enum.Enum):
-    """What the flight controller is doing."""
-
-    STANDBY = "on the ground"
-    SPINNING_UP = "starting the motors"
-    TAKING_OFF = "taking off"
-    FLYING = "in the air"
-    GOING_HOME = "flying home"
-    LANDING = "landing"
-    LANDED = "just landed"
-
-
-_FLIGHT_STATUS = {
-    Phase.STANDBY: 1,
-    Phase.SPINNING_UP: 2,
-    Phase.TAKING_OFF: 2,
-    Phase.FLYING: 3,
-    Phase.GOING_HOME: 3,
-    Phase.LANDING: 4,
-    Phase.LANDED: 5,
-}
-
-
-class Ack(NamedTuple):
-    """Reply to a command, field by field as dji_sdk's services give it."""
-
-    result: bool
-    cmd_set: int
-    cmd_id: int
-    ack_data: int
 
 
 class Receipt(NamedTuple):
@@ -61,23 +38,33 @@ class Receipt(NamedTuple):
 
 
 class Autopilot:
-    """Flies a plant on its own, after setpoints, or after the pilot's sticks."""
+    """Flies a plant on its own, after setpoints, or after the pilot's sticks.
+
+    ``refusal`` says why the last request for motors or a task was refused; empty: it was not.
+    """
 
     def __init__(self, plant: Plant, rc: RemoteControl) -> None:
         self.rc = rc
         self.gps_health = 5
+        self.refusal = ""
         self._plant = plant
         self._settings = plant.preset.flight_controller
+        self._undocumented = self._settings.undocumented
+        self.low_battery = LowBattery(self._settings)
+        self.control = ControlAuthority(rc, self._undocumented)
+        self._events: Deque[str] = deque(maxlen=100)  # for whoever asks, if anybody does
+        self._modes: Optional[tuple] = None  # of the setpoint followed last
         self._loops = FlightLoops(plant)
         self._guidance = Guidance(plant, self._loops)
+        self._auto = AutoFlight(plant, self._loops)
         self.start(0.0, airborne=False)
 
     def start(self, t: float, airborne: bool, authority: bool = False) -> None:
         """Take over a plant just placed at ``t`` [s] on the ground, or hovering in the air."""
         x, y, z = self._plant.position
         self._home = (x, y, 0.0 if airborne else z)
-        self._rc_seen = t
-        self.authority = authority
+        self._t = self._rc_seen = self._corners_since = t
+        self.control.held = authority
         preset = self._plant.preset
         lift = preset.thrust.acceleration(self._plant.hover_percent)
         self._loops.start(vertical_trim=lift - preset.gravity if airborne else 0.0)
@@ -86,56 +73,53 @@ class Autopilot:
     @property
     def flight_status(self) -> int:
         """flight_status of an M100; it is 3 as soon as a take-off leaves the ground (2.3)."""
+        if self.phase is Phase.STANDBY and self._plant.motors_on:
+            return self._undocumented.idle_flight_status
         if self.phase is Phase.TAKING_OFF and not self._plant.on_ground:
             return 3
-        return _FLIGHT_STATUS[self.phase]
+        return FLIGHT_STATUS[self.phase]
 
     @property
     def height(self) -> float:
         """Height above the take-off spot [m]."""
         return self._plant.position[2] - self._home[2]
 
+    def take_events(self) -> List[str]:
+        """Return in words what has happened since the last call and no topic shows."""
+        return [self._events.popleft() for _ in range(len(self._events))]
+
     def control_authority(self, enable: bool) -> Ack:
         """Obtain or release the control authority."""
-        if not enable:
-            self.authority = False
+        ack = self.control.request(self._t, enable)
+        if not self.control.held:
             self._setpoint_time = None
-            return Ack(True, 1, 0, 1)
-        if not self.rc.allows_sdk:
-            return Ack(False, 1, 0, 0)
-        self.authority = True
-        return Ack(True, 1, 0, 2)
+        return ack
 
     def arm(self, t: float, start: bool) -> Ack:
         """Start or stop the motors on the ground."""
-        if not self.authority:
-            return Ack(False, 1, 5, 1)
-        if not start and self.phase not in (Phase.STANDBY, Phase.LANDED):
-            return Ack(False, 1, 5, 3)
-        if start == self._plant.motors_on:
-            return Ack(False, 1, 5, 2)
-        self._plant.motors_on = start
-        self._loops.start()
-        self._enter(t, Phase.STANDBY)
-        return Ack(True, 1, 5, 0)
+        if not self.control.held:
+            ack, self.refusal = 1, "no control authority"
+        elif not start and self.phase not in (Phase.STANDBY, Phase.LANDED):
+            ack, self.refusal = 3, f"the aircraft is {self.phase.value}"
+        elif start == self._plant.motors_on:
+            ack, self.refusal = 2, f"the motors are {'on' if start else 'off'} already"
+        else:
+            ack, self.refusal = 0, ""
+            self._plant.motors_on = start
+            self._loops.start()
+            self._enter(t, Phase.STANDBY)
+        return Ack(ack == 0, 1, 5, ack)
 
     def task(self, t: float, number: int) -> Ack:
         """Start a task; an M100 answers 2 for started and 1 for refused."""
-        phase = self.phase
-        allowed = self.authority and self.rc.allows_sdk
-        aloft = phase in (Phase.TAKING_OFF, Phase.FLYING, Phase.GOING_HOME)
-        ready = phase is Phase.STANDBY and not self._plant.motors_on
-        if number == TASK_TAKE_OFF and allowed and ready:
+        self.refusal = self._task_objection(number)
+        if self.refusal:
+            return Ack(False, 1, 1, 1)
+        if number == TASK_TAKE_OFF:
             self._plant.motors_on = True
             self._home = self._plant.position
             self._loops.start()
-            self._enter(t, Phase.SPINNING_UP)
-        elif number == TASK_LAND and allowed and aloft:
-            self._enter(t, Phase.LANDING)
-        elif number == TASK_GO_HOME and allowed and phase is Phase.FLYING and self._has_position:
-            self._enter(t, Phase.GOING_HOME)
-        else:
-            return Ack(False, 1, 1, 1)
+        self._enter(t, TASKS[number])
         return Ack(True, 1, 1, 2)
 
     def setpoint(self, t: float, setpoint: Setpoint) -> Receipt:
@@ -146,22 +130,49 @@ class Autopilot:
         setpoint, words = limited(setpoint, self._settings.limits, self._plant.preset.tilt_limit)
         if words and not self._settings.clamp:
             return Receipt(False, words)
-        self._guidance.accept(setpoint)
+        if self._setpoint_time is None or setpoint.modes != self._modes:
+            self._modes = setpoint.modes
+            self._events.append(f"following setpoints: {setpoint.words}")
+        self._guidance.accept(setpoint, self._has_position)
         self._setpoint_time = t
         return Receipt(True, words)
 
     def update(self, t: float) -> None:
         """Command the plant for the step that begins at ``t`` [s]."""
-        rc = self.rc
+        self._t, rc = t, self.rc
         if rc.connected:
             self._rc_seen = t
-            # Leaving F ends SDK control, and coming back does not restore it (section 5).
-            self.authority = self.authority and rc.mode == "F"
+        if self.control.update():
+            self._events.append(f"control authority lost: the RC's switch is in {rc.mode}")
+        if rc.connected and rc.mode != "F":
+            self._hand_over(t)
+        if self.low_battery.is_low:
+            demand = self.low_battery.demand(self.phase, self._has_position)
+            if demand:
+                self._events.append(demand[1])
+                self._enter(t, demand[0])
         if self._setpoint_time is not None:
-            age = t - self._setpoint_time
-            if age > self._settings.cmd_timeout + 1e-9 or not rc.allows_sdk:
+            silence = t - self._setpoint_time
+            if silence > self._settings.cmd_timeout + 1e-9 or not rc.allows_sdk:
                 self._setpoint_time = None
+                self._events.append(f"no setpoint for {silence:.2f} s: {self._without_setpoint}")
         _BEHAVIOUR[self.phase](self, t)
+
+    @property
+    def authority(self) -> bool:
+        """Whether the onboard computer holds the control authority."""
+        return self.control.held
+
+    @authority.setter
+    def authority(self, held: bool) -> None:
+        self.control.held = held
+        if not held:
+            self._setpoint_time = None
+
+    @property
+    def _without_setpoint(self) -> str:
+        hovers = self._has_position and self._undocumented.silence == "hover"
+        return f"{'brake and hover' if hovers else 'level, hold height'}; the sticks are live"
 
     @property
     def _has_position(self) -> bool:
@@ -169,16 +180,35 @@ class Autopilot:
 
     def _objection(self, setpoint: Setpoint) -> str:
         """Return why a setpoint is ignored; empty if it is not."""
-        if not self.rc.allows_sdk:
-            return f"the RC is in {self.rc.mode}" if self.rc.connected else "the RC is off"
-        if not self.authority:
-            return "no control authority"
+        objection = self.control.objection()
+        if objection:
+            return objection
         armed = self.phase is Phase.STANDBY and self._plant.motors_on
         if self.phase is not Phase.FLYING and (self._settings.setpoints_need_air or not armed):
             return f"the aircraft is {self.phase.value}"
         if setpoint.horizontal is not Horizontal.ANGLE and not self._has_position:
             return f"gps_health is {self.gps_health}, {setpoint.horizontal.name} needs {GOOD_GPS}"
         return ""
+
+    def _task_objection(self, number: int) -> str:
+        """Return why a task is refused; empty if it is not."""
+        if number not in TASKS:
+            return "no such task"
+        objection = self.control.objection(self._undocumented.tasks_need_authority)
+        state = (self.phase, self._plant.motors_on, self.gps_health)
+        return objection or task_objection(number, *state)
+
+    def _hand_over(self, t: float) -> None:
+        """End a task that runs while the switch is out of F: the pilot has it (section 5)."""
+        forced = self.phase is Phase.LANDING and self.low_battery.lands
+        if forced or self.phase not in (*TASKS.values(), Phase.TAKING_OFF):
+            return
+        self._events.append(f"{self.phase.value} ended: the RC's switch is in {self.rc.mode}")
+        if self._plant.on_ground and self.phase is not Phase.LANDING:
+            self._plant.motors_on = False
+            self._enter(t, Phase.STANDBY)
+        else:
+            self._enter(t, Phase.FLYING)
 
     def _enter(self, t: float, phase: Phase) -> None:
         self.phase = phase
@@ -197,8 +227,21 @@ class Autopilot:
                 self.phase = Phase.FLYING
             return
         self._plant.command(0.0, 0.0, 0.0, 0.0)
+        self._obey_pilot(t)
         if self.phase is Phase.LANDED and t - self._since >= self._settings.landed_time:
             self._enter(t, Phase.STANDBY)
+
+    def _obey_pilot(self, t: float) -> None:
+        """Start the motors after the pilot's stick command, lift off when he gives throttle."""
+        if not self.rc.starts_motors:
+            self._corners_since = t
+        elif not self._plant.motors_on and t - self._corners_since >= STICK_COMMAND_TIME:
+            self._plant.motors_on = True
+            self._loops.start()
+            self._enter(t, Phase.STANDBY)
+        if self._plant.motors_on and self.rc.sticks()[3] > LIFT_OFF_THROTTLE:
+            self._home = self._plant.position
+            self._enter(t, Phase.FLYING)
 
     def _spin_up(self, t: float) -> None:
         self._plant.command(0.0, 0.0, 0.0, 0.0)
@@ -207,37 +250,25 @@ class Autopilot:
 
     def _take_off(self, t: float) -> None:
         target = self._home[2] + self._settings.takeoff_height
-        percent = self._loops.height(target, self._settings.takeoff_speed)
-        self._plant.command(*self._hold_or_level(), percent, 0.0)
+        self._plant.command(*self._auto.take_off(target, self._has_position))
         if abs(target - self._plant.position[2]) < 0.1 and abs(self._plant.velocity[2]) < 0.2:
             self._enter(t, Phase.FLYING)
             self._loops.take_height(target)
 
     def _land(self, t: float) -> None:
-        settings = self._settings
-        speed = self.height / settings.descent_time_constant
-        speed = min(max(speed, settings.landing_speed), settings.descent_speed)
-        percent = self._loops.climb(-speed)
-        self._plant.command(*self._hold_or_level(), percent, 0.0)
-        self._stop_if_down(t, percent)
+        command = self._auto.descend(self.height, self._has_position)
+        self._plant.command(*command)
+        self._stop_if_down(t, command[2])
 
     def _go_home(self, t: float) -> None:
-        settings, (x, y, _) = self._settings, self._plant.position
-        arrived = math.hypot(x - self._home[0], y - self._home[1]) < HOME_RADIUS
-        if arrived or not self._has_position:
+        if self._auto.is_home(self._home) or not self._has_position:
             self._enter(t, Phase.LANDING)
-            return
-        if self.height < settings.go_home_height - 1.0:
-            height = self._home[2] + settings.go_home_height
-            percent = self._loops.height(height, settings.limits.vertical_velocity)
-            tilt = self._loops.hold()
         else:
-            percent = self._loops.hold_height()
-            tilt = self._loops.position(*self._home[:2], speed=settings.limits.horizontal_velocity)
-        self._plant.command(*tilt, percent, 0.0)
+            self._plant.command(*self._auto.go_home(self._home))
 
     def _fly(self, t: float) -> None:
         if t - self._rc_seen > self._settings.rc_lost_time:
+            self._events.append(f"no RC for {self._settings.rc_lost_time:g} s: flying home")
             self._enter(t, Phase.GOING_HOME)
             return
         if self._setpoint_time is not None:
@@ -256,10 +287,6 @@ class Autopilot:
         elif t - self._grounded_since >= self._settings.touchdown_time:
             self._plant.motors_on = False
             self._enter(t, Phase.LANDED)
-
-    def _hold_or_level(self) -> Tuple[float, float]:
-        """Return roll and pitch [rad] that hold the position, or level without one."""
-        return self._loops.hold() if self._has_position else (0.0, 0.0)
 
 
 _BEHAVIOUR = {

@@ -42,24 +42,35 @@ def load_yaml(path: Source) -> Dict[str, Any]:
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
-        data = yaml.load(text, Loader=_NumberLoader)
     except OSError as error:
         raise ConfigError(str(path), "file", error.strerror, "a readable file") from None
     except UnicodeDecodeError:
         raise ConfigError(str(path), "file", "binary data", "YAML text") from None
+    return parse_yaml(text, str(path))
+
+
+def parse_yaml(text: str, source: str) -> Dict[str, Any]:
+    """Return the mapping in YAML text.
+
+    Raises:
+        ConfigError: it is no YAML, or holds no mapping.
+    """
+    try:
+        data = yaml.load(text, Loader=_NumberLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1}" if mark else "file"
-        raise ConfigError(str(path), where, getattr(error, "problem", ""), "valid YAML") from None
+        raise ConfigError(source, where, getattr(error, "problem", ""), "valid YAML") from None
     if not isinstance(data, dict):
-        raise ConfigError(str(path), "file", data, "a mapping of keys to values")
+        raise ConfigError(source, "file", data, "a mapping of keys to values")
     return data
 
 
 def from_dict(cls: Type[T], data: Any, source: str, key: str = "") -> T:
     """Build the dataclass ``cls`` from a mapping.
 
-    A field's metadata may give ``min`` and ``max`` of a number, or the ``choices`` of a text.
+    A field's metadata may give ``min`` and ``max`` of a number, or the ``choices`` of a text. A
+    field with a default may be missing; a tuple of numbers is a list in YAML.
 
     Raises:
         ConfigError: naming source, key, value and what was expected.
@@ -73,11 +84,12 @@ def from_dict(cls: Type[T], data: Any, source: str, key: str = "") -> T:
         if name not in fields:
             raise ConfigError(source, f"{prefix}{name}", data[name], f"one of {', '.join(fields)}")
     for name in fields:
-        if name not in data:
+        if name not in data and fields[name].default is dataclasses.MISSING:
             raise ConfigError(source, f"{prefix}{name}", None, "a value, but the key is missing")
     values = {
         name: _convert(data[name], hints[name], f.metadata, source, prefix + name)
         for name, f in fields.items()
+        if name in data
     }
     return cls(**values)
 
@@ -104,6 +116,15 @@ def numbers(
     return tuple(number(v, source, f"{key}[{i}]", low) for i, v in enumerate(value))
 
 
+def merged(data: Dict[str, Any], changes: Dict[str, Any]) -> Dict[str, Any]:
+    """Return ``data`` with the values of ``changes`` in place of its own, mapping by mapping."""
+    result = dict(data)
+    for key, value in changes.items():
+        both = isinstance(value, dict) and isinstance(result.get(key), dict)
+        result[key] = merged(result[key], value) if both else value
+    return result
+
+
 def _convert(value: Any, hint: Any, metadata: Any, source: str, key: str) -> Any:
     if getattr(hint, "__origin__", None) is Union:
         hint = _matching(hint.__args__, value, source, key)
@@ -112,13 +133,24 @@ def _convert(value: Any, hint: Any, metadata: Any, source: str, key: str) -> Any
     if hint is float:
         low, high = metadata.get("min", -math.inf), metadata.get("max", math.inf)
         return number(value, source, key, low, high)
+    if getattr(hint, "__origin__", None) is tuple:
+        return numbers(value, source, key, len(hint.__args__), metadata.get("min", -math.inf))
     if hint is bool:
         if not isinstance(value, bool):
             raise ConfigError(source, key, value, "true or false")
         return value
+    if hint is int:
+        return _whole(value, metadata, source, key)
     choices: Optional[Tuple[str, ...]] = metadata.get("choices")
     if not isinstance(value, str) or (choices and value not in choices):
         raise ConfigError(source, key, value, f"one of {', '.join(choices)}" if choices else "text")
+    return value
+
+
+def _whole(value: Any, metadata: Any, source: str, key: str) -> int:
+    low, high = metadata["min"], metadata["max"]
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise ConfigError(source, key, value, f"a whole number in [{low}, {high}]")
     return value
 
 

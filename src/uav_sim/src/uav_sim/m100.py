@@ -4,14 +4,27 @@
 import math
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
+import numpy as np
+
 from uav_sim.autopilot import Ack, Autopilot, Phase, Receipt
+from uav_sim.battery import Battery
+from uav_sim.body import BodyState
+from uav_sim.disturbance import Disturbance
 from uav_sim.errors import SetpointError
+from uav_sim.faults.engine import NO_RESPONSE, Faults
+from uav_sim.laser import Laser
+from uav_sim.link import Channel
 from uav_sim.plant import Plant, Vector
 from uav_sim.preset import PACKET_PERIOD, PlantPreset
 from uav_sim.remote_control import RemoteControl
+from uav_sim.sensors import Sensors
 from uav_sim.setpoint import decode
 from uav_sim.telemetry import Packet, Telemetry, body_rates
+from uav_sim.vicon import Vicon, ViconPose
+from uav_sim.wind import Wind
 from uav_sim.world import Collision, World
+
+DRAIN_PERIOD = 0.1  # [s] the battery is looked after as often as it is reported
 
 
 class Truth(NamedTuple):
@@ -28,22 +41,44 @@ class SimulatedM100:
     """Plant, flight controller, link and surroundings on one clock; deterministic.
 
     Begins on the ground at the world's origin with motors off and the RC in F. ``rc`` as well as
-    ``wind``, ``thrust_gain`` and ``mass_factor`` of ``plant`` may be changed at any time.
+    ``wind``, ``thrust_gain`` and ``mass_factor`` of ``plant`` may be changed at any time;
+    ``faults`` are begun and ended at any time or by schedule.
+    A disturbance draws from streams of its own and belongs to one aircraft.
     """
 
-    def __init__(self, preset: PlantPreset, world: Optional[World] = None) -> None:
+    def __init__(
+        self,
+        preset: PlantPreset,
+        world: Optional[World] = None,
+        disturbance: Optional[Disturbance] = None,
+    ) -> None:
         self.preset = preset
         self.t = 0.0  # [s]
-        self.battery = 100.0  # [percent]
+        self._battery = Battery(preset.battery)
         self.rc = RemoteControl()
         self.plant = Plant(preset)
         self.autopilot = Autopilot(self.plant, self.rc)
         self.world = world or World((), preset.radius)
-        self.new_collisions: List[Collision] = []  # of the last step
+        self.disturbance = disturbance
+        self.new_poses: List[ViconPose] = []  # received in the last step
+        self.late_receipts: List[Receipt] = []  # of setpoints that arrived in the last step
+        self.laser: Optional[Laser] = None  # may be set before the first step
+        # Obstacles in the frame of local_position; where there is motion capture, in the world's.
+        self.senses_locally = disturbance is None or disturbance.vicon is None
+        self.new_scan: Optional[np.ndarray] = None  # (n,) [m] taken in the last step
+        seed = disturbance.seed if disturbance is not None else 0
+        self.faults = Faults(self, f"{seed}/{self.world.name}")
         self._telemetry = Telemetry(self.plant)
-        self._steps = 0
+        self._steps, self._step = 0, preset.step
+        self._rc_values = preset.flight_controller.rc
         self._steps_per_packet = round(PACKET_PERIOD / preset.step)
-        self._discharge = 100.0 * preset.step / preset.flight_time
+        self._steps_per_drain = round(DRAIN_PERIOD / preset.step)
+        self._wind: Optional[Wind] = None
+        self._commands: Optional[Channel] = None
+        self._vicon: Optional[Vicon] = None
+        self._navigation: Optional[Sensors] = None  # of a position that drifts
+        if disturbance is not None:
+            self._disturb(disturbance)
 
     def place(
         self,
@@ -67,23 +102,36 @@ class SimulatedM100:
     def step(self) -> List[Packet]:
         """Advance by ``preset.step``; return the packets received in it, oldest first."""
         plant = self.plant
-        self.autopilot.update(self.t)
+        self.faults.update(self.t)
+        if self._wind is not None and self._steps % self._wind.steps == 0:
+            plant.wind = self._wind.advance(plant.position[2], plant.velocity)
+        if self._commands is not None:
+            arrived = self._commands.receive(self.t)
+            self.late_receipts = [self.autopilot.setpoint(self.t, s) for s in arrived]
+        if self._navigation is None:
+            self.autopilot.update(self.t)
+        else:
+            self._navigate(self._navigation.drift)
         plant.step()
         self._steps += 1
-        self.t = self._steps * self.preset.step
-        if plant.motors_on:
-            self.battery = max(0.0, self.battery - self._discharge)
-        self.new_collisions = self.world.observe(self.t, plant.position)
+        self.t = self._steps * self._step
+        self.world.observe(self.t, plant.position)
+        if self._vicon is not None:
+            self.new_poses = self._vicon.poses(self.t, plant.position, plant.rpy)
+        if self.laser is not None:
+            self._scan(self.laser)
         if self._steps % self._steps_per_packet == 0:
+            if self._steps % self._steps_per_drain == 0:
+                self._drain()
             self._telemetry.sample(
                 self.t,
-                rc=self.rc.axes(self.preset.flight_controller.rc),
+                rc=self.rc.axes(self._rc_values),
                 gps_health=self.autopilot.gps_health,
                 height=self.autopilot.height,
                 flight_status=self.autopilot.flight_status,
                 battery=float(math.ceil(self.battery)),
             )
-        return self._telemetry.due(self.t)
+        return self.faults.filter(self.t, self._telemetry.due(self.t))
 
     def run(self, duration: float) -> List[Packet]:
         """Advance by a duration [s]; return all packets received."""
@@ -91,27 +139,46 @@ class SimulatedM100:
 
     def setpoint(self, suffix: str, axes: Sequence[float]) -> Receipt:
         """Send axes on the topic ``flight_control_setpoint_<suffix>``; say what became of them."""
+        fault = self.faults.objection(suffix)
+        if fault:
+            return Receipt(False, fault)
         try:
             setpoint = decode(suffix, axes)
         except SetpointError as error:
             return Receipt(False, str(error))
+        if self._commands is not None:
+            self._commands.send(self.t, setpoint)
+            return Receipt(True)
         return self.autopilot.setpoint(self.t, setpoint)
 
     def control_authority(self, enable: bool) -> Ack:
         """Obtain or release the control authority."""
-        return self.autopilot.control_authority(enable)
+        return self._reply(1, 0) or self.autopilot.control_authority(enable)
 
     def arm(self, start: bool) -> Ack:
         """Start or stop the motors on the ground."""
-        return self.autopilot.arm(self.t, start)
+        return self._reply(1, 5) or self.autopilot.arm(self.t, start)
 
     def task(self, number: int) -> Ack:
         """Start a task: 1 go home, 4 take off, 6 land."""
-        return self.autopilot.task(self.t, number)
+        return self._reply(1, 1) or self.autopilot.task(self.t, number)
 
     def set_local_position_reference(self) -> bool:
         """Make the newest GPS position the origin of ``local_position``."""
-        return self._telemetry.set_local_position_reference(self.t)
+        return not self.faults.dead and self._telemetry.set_local_position_reference(self.t)
+
+    def restart_driver(self) -> None:
+        """Start dji_sdk's node anew: it knows no reference any more."""
+        self._telemetry.frame.reference = None
+
+    @property
+    def battery(self) -> float:
+        """State of charge [percent]."""
+        return self._battery.percent
+
+    @battery.setter
+    def battery(self, percent: float) -> None:
+        self._battery.percent = percent
 
     @property
     def phase(self) -> Phase:
@@ -127,11 +194,75 @@ class SimulatedM100:
         return Truth(self.t, plant.position, plant.velocity, rpy, body_rates(rpy, plant.rpy_rates))
 
     @property
+    def new_collisions(self) -> List[Collision]:
+        """Collisions that began in the last step."""
+        return self.world.new_collisions
+
+    @property
     def collisions(self) -> Tuple[Collision, ...]:
         """All collisions since the flight began."""
         return tuple(self.world.collisions)
 
     @property
+    def sensed_obstacles(self) -> List[BodyState]:
+        """Obstacles as sensed from the aircraft, in the frame of its ``local_position``.
+
+        They count from the same origin, where that is known, and share its slow error; with
+        ``senses_locally`` unset they stay in the world's frame.
+        """
+        states, disturbance = self.world.states(), self.disturbance
+        shift = disturbance.shift if disturbance is not None else None
+        dx, dy, dz = shift or (0.0, 0.0, 0.0)
+        if self.senses_locally:
+            x, y, z = self._telemetry.origin
+            dx, dy, dz = dx - x, dy - y, dz - z
+        if dx == dy == dz == 0.0:
+            return states
+        return [
+            state._replace(position=(x + dx, y + dy, z + dz))
+            for state in states
+            for x, y, z in [state.position]
+        ]
+
+    @property
     def clearance(self) -> Dict[str, float]:
         """Least distance [m] from hull to each obstacle's surface since the flight began, by id."""
         return self.world.clearance
+
+    def _drain(self) -> None:
+        """Discharge by the present thrust, and sag."""
+        battery, plant = self._battery, self.plant
+        if plant.motors_on:
+            battery.discharge(plant.thrust_force, DRAIN_PERIOD)
+        plant.battery_gain = battery.thrust_gain
+        self.autopilot.low_battery.take(battery.percent)
+
+    def _reply(self, cmd_set: int, cmd_id: int) -> Optional[Ack]:
+        """Return the reply of a dead node: none; None if it lives."""
+        return Ack(False, cmd_set, cmd_id, NO_RESPONSE) if self.faults.dead else None
+
+    def _navigate(self, drift: Vector) -> None:
+        """Have the flight controller act on its own horizontal position, which drifts."""
+        plant = self.plant
+        x, y, z = true = plant.position
+        plant.position = (x + drift[0], y + drift[1], z)
+        self.autopilot.update(self.t)
+        plant.position = true
+
+    def _scan(self, laser: Laser) -> None:
+        self.new_scan = None
+        if laser.due(self.t):
+            plant = self.plant
+            self.new_scan = laser.scan(plant.position, plant.rpy, self.world.states())
+
+    def _disturb(self, disturbance: Disturbance) -> None:
+        self.plant.thrust_gain = disturbance.thrust_gain
+        self.plant.mass_factor = disturbance.mass_factor
+        self.autopilot.gps_health = disturbance.parameters.gps_health
+        self._telemetry.sensors = disturbance.sensors
+        self._telemetry.link = disturbance.telemetry
+        self._wind = disturbance.wind(self.preset.step)
+        self._commands = disturbance.command
+        self._vicon = disturbance.vicon
+        if disturbance.parameters.sensors.position.drift > 0.0:
+            self._navigation = disturbance.sensors

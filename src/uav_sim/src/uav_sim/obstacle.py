@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""Obstacles of the simulated world: spheres, vertical cylinders and axis-aligned boxes."""
+"""Obstacles of the simulated world: spheres, vertical cylinders and axis-aligned boxes.
+
+Interface: ``Obstacle`` is what a scenario says (shape, place, how it moves); where it is now, also
+when it chases or has just appeared, is a ``scene.Body``. ``load_obstacles`` reads the YAML list.
+"""
 
 import math
 from dataclasses import dataclass
-from typing import Any, Mapping, Tuple
+from typing import Any, Mapping, Optional, Tuple
 
 from uav_sim.config import number, numbers
 from uav_sim.errors import ConfigError
-
-Vector = Tuple[float, float, float]
+from uav_sim.motion import STILL, Appear, Line, Motion, Vector
+from uav_sim.motion_entry import load_appear, load_motion
 
 # Keys that give the size [m] of each shape, with how many numbers each.
 _SIZE_KEYS = {
@@ -16,6 +20,7 @@ _SIZE_KEYS = {
     "cylinder": (("radius", 1), ("height", 1)),
     "box": (("size", 3),),
 }
+_OPTIONAL_KEYS = ("shape", "velocity", "motion", "appear")
 _MIN_SIZE = 1e-3  # [m]
 _SEARCH_STEPS = 40  # golden section: shrinks a step's path to 4e-9 of itself
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -23,18 +28,20 @@ _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A body that must not be touched; it moves with a constant velocity."""
+    """A body that must not be touched, and how it moves."""
 
     id: str
     shape: str  # sphere, cylinder or box
     size: Tuple[float, ...]  # [m] (radius,), (radius, height) or full edge lengths (3,)
-    position: Vector  # [m] centre at t = 0, world frame
-    velocity: Vector = (0.0, 0.0, 0.0)  # [m/s]
+    position: Vector  # [m] centre when its motion begins, world frame
+    velocity: Vector = STILL  # [m/s] of an obstacle without ``motion``
+    motion: Optional[Motion] = None  # None: straight at ``velocity``
+    appear: Optional[Appear] = None  # None: there from t = 0 on
 
-    def position_at(self, t: float) -> Vector:
-        """Return the centre (3,) [m] at time ``t`` [s]."""
-        (x, y, z), (vx, vy, vz) = self.position, self.velocity
-        return (x + t * vx, y + t * vy, z + t * vz)
+    @property
+    def path(self) -> Motion:
+        """How it moves."""
+        return self.motion or Line(self.position, self.velocity)
 
     def distance(self, x: float, y: float, z: float) -> float:
         """Return the distance [m] to the surface at an offset [m] from the centre; < 0 inside."""
@@ -108,11 +115,12 @@ def _load(item: Any, source: str, key: str) -> Obstacle:
     if not isinstance(shape, str) or shape not in _SIZE_KEYS:
         raise ConfigError(source, f"{key}.shape", shape, f"one of {', '.join(_SIZE_KEYS)}")
     size_keys = _SIZE_KEYS[shape]
-    known = ["id", "shape", "position", "velocity", *(name for name, _ in size_keys)]
+    names = [name for name, _ in size_keys]
+    known = ["id", "position", *names, *_OPTIONAL_KEYS]
     for name in item:
         if name not in known:
             raise ConfigError(source, f"{key}.{name}", item[name], f"one of {', '.join(known)}")
-    for name in ("id", "position", *(name for name, _ in size_keys)):
+    for name in ("id", "position", *names):
         if name not in item:
             raise ConfigError(source, f"{key}.{name}", None, "a value, but the key is missing")
     if not isinstance(item["id"], str) or not item["id"]:
@@ -123,6 +131,9 @@ def _load(item: Any, source: str, key: str) -> Obstacle:
         if length == 1:
             number(item[name], source, f"{key}.{name}", _MIN_SIZE)
         size.extend(numbers(value, source, f"{key}.{name}", length, _MIN_SIZE))
-    position = numbers(item["position"], source, f"{key}.position", 3)
-    velocity = numbers(item.get("velocity", [0.0, 0.0, 0.0]), source, f"{key}.velocity", 3)
-    return Obstacle(item["id"], shape, tuple(size), position, velocity)
+    position: Vector = numbers(item["position"], source, f"{key}.position", 3)
+    motion = load_motion(item, position, source, key)
+    velocity = motion.step if isinstance(motion, Line) else STILL
+    motion = motion if item.get("motion") else None
+    appear = load_appear(item.get("appear"), source, f"{key}.appear")
+    return Obstacle(item["id"], shape, tuple(size), position, velocity, motion, appear)

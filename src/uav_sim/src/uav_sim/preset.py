@@ -3,15 +3,19 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import List, Union
+from typing import Any, Dict, List, Optional, Union
 
-from uav_sim.config import config_directory, from_dict, load_yaml
+from uav_sim.config import config_directory, from_dict, load_yaml, merged
 from uav_sim.errors import ConfigError
 
 PACKET_PERIOD = 0.01  # [s] between two packets of the M100's serial link (doc/dji_sdk.md 2.1)
 
 
 def _number(low: float = 0.0, high: float = math.inf) -> float:
+    return field(metadata={"min": low, "max": high})
+
+
+def _whole(low: int, high: int) -> int:
     return field(metadata={"min": low, "max": high})
 
 
@@ -62,6 +66,33 @@ class Drag:
 
 
 @dataclass(frozen=True)
+class GroundEffect:
+    """More thrust near the ground: Cheeseman and Bennett, 1955, 1 / (1 - (R / 4 z)^2)."""
+
+    strength: float = _number(0.0, 4.0)  # [1] on the squared ratio; 0: off
+    rotor_radius: float = _number(0.01)  # [m]
+    rotor_height: float = _number(0.01)  # [m] of the rotors above the ground, standing
+
+    def gain(self, z: float) -> float:
+        """Return the thrust at a height [m] of the legs above the ground by that far away."""
+        ratio = 0.25 * self.rotor_radius / (max(z, 0.0) + self.rotor_height)
+        return 1.0 / (1.0 - min(self.strength * ratio * ratio, 0.5))
+
+
+@dataclass(frozen=True)
+class BatteryModel:
+    """Discharge over time, and what a charge takes from the thrust."""
+
+    flight_time: float = _number(1.0)  # [s] hover of the nominal aircraft from 100 to 0 percent
+    idle_power: float = _number()  # [1] of the hover's, motors idle
+    hover_full: float = _number(1.0, 100.0)  # [percent] of thrust, above the knee
+    sag_slope: float = _number()  # [percent of thrust per percent of charge] below the knee
+    sag_knee: float = _number(0.0, 100.0)  # [percent]
+    cutoff: float = _number(0.1, 100.0)  # [percent] the voltage collapses from here
+    empty_gain: float = _number(0.0, 1.0)  # [1] of the thrust that is left at 0 percent
+
+
+@dataclass(frozen=True)
 class Delay:
     """Dead times of the link, one per channel of the command and one for all telemetry."""
 
@@ -75,6 +106,7 @@ class Delay:
 class Limits:
     """Range of setpoints that the flight controller follows, beside the tilt limit."""
 
+    angle: float = _number()  # [rad] of roll and of pitch, before the vector is limited
     yaw_rate: float = _number()  # [rad/s]
     thrust_min: float = _number(0.0, 100.0)  # [percent]
     thrust_max: float = _number(0.0, 100.0)  # [percent]
@@ -110,6 +142,21 @@ class Loops:
 
 
 @dataclass(frozen=True)
+class Undocumented:
+    """What DJI's code and documents leave open; each choice stands in ``common.yaml``."""
+
+    silence: str = field(metadata={"choices": ("hover", "level")})  # flown after cmd_timeout, in F
+    stable_angle_holds: bool = field()
+    tasks_need_authority: bool = field()
+    authority_survives_toggle: bool = field()
+    authority_time: float = _number()  # [s]
+    wrong_mode_ack: int = _whole(0, 6)
+    activation_ack: int = _whole(0, 0xFFFF)
+    idle_flight_status: int = _whole(0, 5)
+    velocity_z_sign: float = _number(-1.0, 1.0)  # [1]
+
+
+@dataclass(frozen=True)
 class FlightController:
     """Behaviour of the flight controller; what each number rests on stands in ``common.yaml``."""
 
@@ -127,8 +174,11 @@ class FlightController:
     landed_time: float = _number()  # [s]
     go_home_height: float = _number()  # [m]
     rc_lost_time: float = _number()  # [s]
+    battery_go_home: float = _number(0.0, 100.0)  # [percent] 0: never
+    battery_land: float = _number(0.0, 100.0)  # [percent] 0: never
     rc: RcValues = field()
     loops: Loops = field()
+    undocumented: Undocumented = field()
 
 
 @dataclass(frozen=True)
@@ -151,6 +201,7 @@ class PlantPreset:
     pitch: Response = field()
     yaw_rate: Response = field()
     thrust: Thrust = field()
+    rotor_time_constant: float = _number()  # [s] lag of the thrust behind its command; 0: none
     drag: Drag = field()
     tilt_limit: float = _number()  # [rad] norm of the commanded (roll, pitch)
     delay: Delay = field()
@@ -158,7 +209,9 @@ class PlantPreset:
     gravity: float = _number()  # [m/s^2]
     gravity_const: float = _number()  # [m/s^2 per g] scale of the accelerometer
     ground_friction: float = _number()  # [1]
-    flight_time: float = _number(1.0)  # [s] a full battery lasts with motors on
+    ground_effect: GroundEffect = field()
+    payload: float = _number()  # [kg] on top of the mass
+    battery: BatteryModel = field()
     home: GeoPoint = field()  # the world's origin
     flight_controller: FlightController = field()
 
@@ -173,8 +226,15 @@ def preset_names() -> List[str]:
     return sorted(path.stem for path in (config_directory() / "presets").glob("*.yaml"))
 
 
-def load_preset(name: str) -> PlantPreset:
+def load_preset(
+    name: str, changes: Optional[Dict[str, Any]] = None, source: str = "changes"
+) -> PlantPreset:
     """Return the preset of ``config/presets/<name>.yaml`` with the rest from ``common.yaml``.
+
+    Args:
+        name: of the preset.
+        changes: values of the same keys that win over both files.
+        source: where the changes come from, for the words of an error.
 
     Raises:
         ConfigError: no such preset, or one that is wrong.
@@ -185,6 +245,8 @@ def load_preset(name: str) -> PlantPreset:
     path = directory / "presets" / f"{name}.yaml"
     data = {**load_yaml(directory / "common.yaml"), **load_yaml(path)}
     preset = from_dict(PlantPreset, data, path.name)
+    if changes:
+        preset = from_dict(PlantPreset, merged(data, changes), source)
     steps = PACKET_PERIOD / preset.step
     if abs(steps - round(steps)) > 1e-9:
         raise ConfigError(path.name, "step", preset.step, f"a divisor of {PACKET_PERIOD} s")

@@ -7,6 +7,7 @@ from typing import Tuple
 from uav_sim.preset import RcValues
 
 STICK_DEADBAND = 0.02  # [1]
+CORNER = 0.8  # [1] a stick is in a corner when both of its axes are beyond this
 
 
 @dataclass
@@ -25,6 +26,13 @@ class RemoteControl:
     def allows_sdk(self) -> bool:
         """The switch is in F and the link stands."""
         return self.connected and self.mode == "F"
+
+    @property
+    def starts_motors(self) -> bool:
+        """Both sticks are held in a lower corner, the pilot's command to start the motors."""
+        sideways = min(abs(self.roll), abs(self.yaw))
+        down = -max(self.pitch, self.throttle)
+        return self.connected and min(sideways, down) > CORNER
 
     def axes(self, values: RcValues) -> Tuple[float, ...]:
         """Return the six axes of the ``rc`` topic; the gear axis of a dead link is 0."""

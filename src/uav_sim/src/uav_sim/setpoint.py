@@ -5,14 +5,13 @@ A decoded setpoint is in the flight controller's convention: degrees, forward-ri
 yaw clockwise from north, up positive.
 """
 
-import dataclasses
 import enum
+import functools
 import math
-from dataclasses import dataclass
-from typing import List, Sequence, Tuple
+from typing import List, NamedTuple, Sequence, Tuple
 
 from uav_sim.errors import SetpointError
-from uav_sim.plant import limit_norm
+from uav_sim.plant import limit_norm, limit_tilt
 from uav_sim.preset import Limits
 
 ROUNDING = 1e-5
@@ -56,8 +55,7 @@ class Frame(enum.IntEnum):
     BODY = 0x02
 
 
-@dataclass(frozen=True)
-class Setpoint:
+class Setpoint(NamedTuple):
     """One setpoint in the flight controller's convention."""
 
     horizontal: Horizontal
@@ -69,6 +67,22 @@ class Setpoint:
     y: float  # pitch, nose up [deg], else the same: east (GROUND) or right (BODY)
     z: float  # velocity [m/s], height above take-off [m] or thrust [percent]
     yaw: float  # clockwise: angle from north [deg] or rate [deg/s]
+
+    @property
+    def modes(self) -> Tuple[Horizontal, Vertical, Yaw, Frame, bool]:
+        """The control byte in its parts."""
+        return self[:5]
+
+    @property
+    def words(self) -> str:
+        """The control byte in words."""
+        words = (
+            f"horizontal {self.horizontal.name}",
+            f"vertical {self.vertical.name}",
+            f"yaw {self.yaw_mode.name}",
+            self.frame.name,
+        )
+        return ", ".join(words).lower() + (", stable" if self.stable else "")
 
 
 def decode(suffix: str, axes: Sequence[float]) -> Setpoint:
@@ -105,6 +119,7 @@ def decode(suffix: str, axes: Sequence[float]) -> Setpoint:
     return Setpoint(horizontal, vertical, yaw_mode, frame, bool(flag & 0x01), x, y, z, yaw)
 
 
+@functools.lru_cache(maxsize=256)
 def _modes(flag: int) -> Tuple[Horizontal, Vertical, Yaw, Frame]:
     if not 0 <= flag <= 0xFF:
         raise SetpointError(f"control byte {flag} is not in 0..255")
@@ -133,7 +148,9 @@ def limited(setpoint: Setpoint, limits: Limits, tilt_limit: float) -> Tuple[Setp
     x, y, z, yaw = setpoint.x, setpoint.y, setpoint.z, setpoint.yaw
     words: List[str] = []
     if setpoint.horizontal is Horizontal.ANGLE:
-        x, y = _shorten(words, "tilt", x, y, math.degrees(tilt_limit), "deg")
+        angle, bound = math.degrees(limits.angle), math.degrees(tilt_limit)
+        _note(words, "tilt", math.hypot(x, y), 0.0, bound, "deg")
+        x, y = limit_tilt(x, y, angle, bound)
     elif setpoint.horizontal is Horizontal.VELOCITY:
         x, y = _shorten(words, "horizontal velocity", x, y, limits.horizontal_velocity, "m/s")
     if setpoint.vertical is Vertical.VELOCITY:
@@ -148,7 +165,7 @@ def limited(setpoint: Setpoint, limits: Limits, tilt_limit: float) -> Tuple[Setp
         yaw = _clamp(words, "yaw rate", yaw, -bound, bound, "deg/s")
     if not words:
         return setpoint, ""
-    return dataclasses.replace(setpoint, x=x, y=y, z=z, yaw=yaw), ", ".join(words)
+    return setpoint._replace(x=x, y=y, z=z, yaw=yaw), ", ".join(words)
 
 
 def _shorten(

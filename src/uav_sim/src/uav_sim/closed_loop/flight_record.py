@@ -9,6 +9,7 @@ from nmpc_control import dji
 from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Reference, Series
 from nmpc_control.scenario import Scenario
 from nmpc_control.state import POSITION, VELOCITY, Obstacle
+from uav_sim.body import BodyState
 from uav_sim.closed_loop.loop import Log
 from uav_sim.world import World
 
@@ -34,7 +35,7 @@ def record_of(scenario: Scenario, log: Log, collisions: int) -> FlightRecord:
             log.clock_start, Series(times, scenario.trajectory.sample(times).position)
         ),
         tracked_reference=Series(solved, [step.reference[POSITION] for step in steps]),
-        obstacles=tuple(ObstacleTrack(obstacle) for obstacle in scenario.obstacles),
+        obstacles=_tracks(scenario, log),
         commands=Series([t for t, _ in sent], [_command(axes) for _, axes in sent]),
         solver=Series(
             solved, [(s.plan.iterations, s.plan.solve_time, s.plan.found) for s in steps]
@@ -45,6 +46,25 @@ def record_of(scenario: Scenario, log: Log, collisions: int) -> FlightRecord:
         phase_end=log.end,
         reported_collisions=collisions,
     )
+
+
+def _tracks(scenario: Scenario, log: Log) -> Tuple[ObstacleTrack, ...]:
+    """Return where obstacles truly were; what does not move stands as in the scenario."""
+    if not log.obstacles:
+        return tuple(ObstacleTrack(obstacle) for obstacle in scenario.obstacles)
+    seen: Dict[str, List[Tuple[float, BodyState]]] = {}
+    for t, states in log.obstacles:
+        for state in states:
+            seen.setdefault(state.obstacle.id, []).append((t, state))
+    return tuple(_track(samples) for samples in seen.values())
+
+
+def _track(samples: List[Tuple[float, BodyState]]) -> ObstacleTrack:
+    times = [t for t, _ in samples]
+    body = samples[0][1].obstacle
+    obstacle = Obstacle(body.id, np.array(body.position), np.array(body.size), body.shape)
+    centres = Series(times, [state.position for _, state in samples])
+    return ObstacleTrack(obstacle, centres, begin=times[0])
 
 
 def _command(axes: dji.Axes) -> Tuple[float, float, float, float]:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Controller, guard and simulated aircraft on one clock, without ROS."""
 
+import dataclasses
 from dataclasses import dataclass, field
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
@@ -14,11 +15,15 @@ from nmpc_control.guard_params import GuardParameters
 from nmpc_control.mode_inputs import PLANNED, STREAMING, Request
 from nmpc_control.params import Parameters
 from nmpc_control.scenario import Scenario
-from nmpc_control.state import hover_input
+from nmpc_control.state import Obstacle, hover_input
+from uav_sim.body import BodyState
+from uav_sim.disturbance import Disturbance
+from uav_sim.errors import SimulatorError
 from uav_sim.m100 import SimulatedM100, Truth
 from uav_sim.preset import PlantPreset
 from uav_sim.world import World
 
+OBSTACLE_PERIOD = 0.1  # [s] between two lists of sensed obstacles
 _START_TIMEOUT = 30.0  # [s] from the first packet to automatic flight
 _AFTER_ARRIVAL = 1.0  # [s] of hover that is still recorded
 _GENERIC = "generic"
@@ -31,12 +36,21 @@ class Log:
     steps: List[Step] = field(default_factory=list)
     outputs: List[Tuple[float, GuardOutput]] = field(default_factory=list)
     truths: List[Truth] = field(default_factory=list)
+    obstacles: List[Tuple[float, List[BodyState]]] = field(default_factory=list)  # true, moving
     clock_start: Optional[float] = None  # [s] of the trajectory's clock
     end: float = 0.0  # [s]
 
 
+class NoFlightError(SimulatorError):
+    """Automatic flight did not begin; the text says why."""
+
+
 class ClosedLoop:
-    """One vehicle under automatic control; ``step`` advances all of it by one step of the plant."""
+    """One vehicle under automatic control; ``step`` advances all of it by one step of the plant.
+
+    Its position comes from motion capture where the disturbance has it, else from GPS. Obstacles
+    that move, or drift with the position, are handed over as sensed, at 10 Hz.
+    """
 
     def __init__(
         self,
@@ -44,14 +58,21 @@ class ClosedLoop:
         world: World,
         parameters: Parameters,
         guard_parameters: GuardParameters,
+        disturbance: Optional[Disturbance] = None,
     ) -> None:
-        self.aircraft = SimulatedM100(preset, world)
+        self.aircraft = SimulatedM100(preset, world, disturbance)
+        self._captured = disturbance is not None and disturbance.vicon is not None
+        if self._captured:
+            guard_parameters = dataclasses.replace(guard_parameters, position_source="external")
+        is_shifted = disturbance is not None and disturbance.shift is not None
+        self.senses = self.aircraft.world.moves or is_shifted  # obstacles, again and again
         self.controller = Controller(parameters)
         self.guard = Guard(guard_parameters, parameters.vehicle, parameters.limits)
         self.inbox = GuardInbox(guard_parameters)
         self.log = Log()
         self._ticks = _every(1.0 / guard_parameters.rate, preset.step)
         self._solves = _every(1.0 / parameters.solver.budget.rate, preset.step)
+        self._looks = _every(OBSTACLE_PERIOD, preset.step)
         self._count = 0
 
     @property
@@ -63,6 +84,11 @@ class ClosedLoop:
         """Advance by one step: telemetry, solve when due, guard when due, aircraft."""
         for packet in self.aircraft.step():
             self._receive(packet.topic, packet.t, packet.value)
+        for pose in self.aircraft.new_poses:
+            for estimator in (self.controller.estimator, self.inbox.estimator):
+                estimator.add_position(pose.t, pose.position)
+        if self.senses and self._count % self._looks == 0:
+            self._look()
         self._count += 1
         if self._count % self._solves == 0:
             self._solve()
@@ -78,7 +104,7 @@ class ClosedLoop:
                 estimator.add_imu(t, value.angular_velocity)
             elif topic == "velocity":
                 estimator.add_velocity(t, value)
-            elif topic == "local_position":
+            elif topic == "local_position" and not self._captured:
                 estimator.add_position(t, value)
         timed: Dict[str, Callable[[float, Any], None]] = {
             "rc": self.inbox.add_rc,
@@ -90,6 +116,12 @@ class ClosedLoop:
             timed[topic](t, value)
         elif topic == "height_above_takeoff":
             self.inbox.add_height(value)
+
+    def _look(self) -> None:
+        sensed = [_known(state, self.t) for state in self.aircraft.sensed_obstacles]
+        self.controller.obstacles = self.inbox.obstacles = tuple(sensed)
+        if self.aircraft.world.moves:
+            self.log.obstacles.append((self.t, self.aircraft.world.states()))
 
     def _solve(self) -> None:
         step = self.controller.step(self.t)
@@ -137,14 +169,18 @@ def fly(
     """Fly a scenario from its initial position in the air; returns the log of the whole flight.
 
     Args:
-        scenario: what to fly; its obstacles are known to controller and guard.
+        scenario: what to fly; obstacles that stand are known to controller and guard from it.
         loop: aircraft and control, new.
         approach: fly to the start and settle first; otherwise the clock starts as soon as
             automatic flight is on.
         on_progress: called with 0..1.
+
+    Raises:
+        NoFlightError: automatic flight did not begin.
     """
     loop.aircraft.place(scenario.initial_position, yaw=scenario.start_yaw)
-    loop.controller.obstacles = loop.inbox.obstacles = scenario.obstacles
+    if not loop.senses:
+        loop.controller.obstacles = loop.inbox.obstacles = scenario.obstacles
     while (
         loop.guard.mode not in STREAMING
         or not loop.controller.engaged
@@ -153,7 +189,7 @@ def fly(
         loop.inbox.request = Request.START
         loop.step()
         if loop.t > _START_TIMEOUT:
-            raise RuntimeError(f"automatic flight did not begin: {loop.log.outputs[-1][1].reason}")
+            raise NoFlightError(f"automatic flight did not begin: {loop.log.outputs[-1][1].reason}")
     itinerary = loop.controller.itinerary
     x = loop.controller.estimator.estimate(loop.t).vector
     if approach:
@@ -168,6 +204,19 @@ def fly(
         loop.step()
     loop.log.end = loop.t
     return loop.log
+
+
+def _known(state: BodyState, t: float) -> Obstacle:
+    """Return an obstacle of the simulator as the controller's, seen at ``t`` [s]."""
+    obstacle, position, velocity = state
+    return Obstacle(
+        obstacle.id,
+        np.array(position),
+        np.array(obstacle.size),
+        obstacle.shape,
+        np.array(velocity),
+        t,
+    )
 
 
 def _every(period: float, step: float) -> int:

@@ -3,6 +3,10 @@
 
 Controller, guard and simulated aircraft in one process.
 
+With --disturbance there is wind, the sensors have errors, latency varies, and thrust and mass are
+drawn around the nominal ones; --seed picks the draw. At "indoor" the position comes from motion
+capture. The same seed gives the same flight.
+
 With --plant paper a scenario that has a variant "paper" is flown as in the paper's table of
 simulations: its geometry, duration, start at rest, and distances from the aircraft's centre.
 """
@@ -25,9 +29,12 @@ from nmpc_control.guard_params import load_guard_parameters
 from nmpc_control.params import Parameters, load_parameters
 from nmpc_control.scenario import Scenario, load_scenario, scenario_path
 from uav_sim.closed_loop.flight_record import record_of, world_of
-from uav_sim.closed_loop.loop import ClosedLoop, fly
+from uav_sim.closed_loop.loop import ClosedLoop, NoFlightError, fly
+from uav_sim.disturbance import Disturbance, disturbance_names, load_disturbance
 from uav_sim.errors import SimulatorError
-from uav_sim.preset import load_preset, preset_names
+from uav_sim.preset import preset_names
+from uav_sim.spread import any_preset
+from uav_sim.world import World
 
 _PAPER = "paper"
 
@@ -37,9 +44,18 @@ def main(argv: Optional[List[str]] = None) -> None:
     options = _parser().parse_args(argv)
     try:
         scenario, parameters = _prepare(options)
-        metrics = simulate(scenario, parameters, options.plant, quiet=options.quiet)
+        metrics = simulate(
+            scenario,
+            parameters,
+            options.plant,
+            quiet=options.quiet,
+            world=_world(options, scenario, parameters.vehicle.radius),
+            disturbance=Disturbance(load_disturbance(options.disturbance), options.seed),
+        )
         if options.json:
             options.json.write_text(json.dumps(metrics, indent=2) + "\n", encoding="utf-8")
+    except NoFlightError as error:
+        _fail(str(error), status=1)
     except (NmpcError, SimulatorError) as error:
         _fail(str(error))
     except OSError as error:
@@ -49,7 +65,14 @@ def main(argv: Optional[List[str]] = None) -> None:
     sys.exit(0 if metrics["arrived"] and metrics["collisions"] == 0 else 1)
 
 
-def simulate(scenario: Scenario, parameters: Parameters, plant: str, quiet: bool = True) -> Metrics:
+def simulate(
+    scenario: Scenario,
+    parameters: Parameters,
+    plant: str,
+    quiet: bool = True,
+    world: Optional[World] = None,
+    disturbance: Optional[Disturbance] = None,
+) -> Metrics:
     """Return the metrics of one simulated flight.
 
     Args:
@@ -58,11 +81,14 @@ def simulate(scenario: Scenario, parameters: Parameters, plant: str, quiet: bool
             and metrics.
         plant: name of the plant preset.
         quiet: no progress bar.
+        world: surroundings; None: the scenario's obstacles, all at rest.
+        disturbance: of the flight, new; None: there is none.
 
     Raises:
         ConfigError: a preset that does not exist.
+        NoFlightError: automatic flight did not begin.
     """
-    loop = new_loop(scenario, parameters, plant)
+    loop = new_loop(scenario, parameters, plant, world, disturbance)
     with Progress(disable=quiet, transient=True) as bar:
         task = bar.add_task(f"{scenario.name} on {plant}", total=1.0)
         log = fly(scenario, loop, on_progress=lambda progress: bar.update(task, completed=progress))
@@ -70,18 +96,37 @@ def simulate(scenario: Scenario, parameters: Parameters, plant: str, quiet: bool
         record_of(scenario, log, len(loop.aircraft.collisions)), parameters.vehicle.radius
     )
     metrics["plant"] = plant
+    if disturbance is not None:
+        metrics["disturbance"] = disturbance.parameters.name
+        metrics["seed"] = disturbance.seed
     metrics["clearance_truth_m"] = dict(loop.aircraft.clearance)
     metrics["plans_rejected"] = loop.guard.ladder.rejected
     return metrics
 
 
-def new_loop(scenario: Scenario, parameters: Parameters, plant: str) -> ClosedLoop:
-    """Return aircraft and control among a scenario's obstacles, before the flight.
+def new_loop(
+    scenario: Scenario,
+    parameters: Parameters,
+    plant: str,
+    world: Optional[World] = None,
+    disturbance: Optional[Disturbance] = None,
+) -> ClosedLoop:
+    """Return aircraft and control before the flight; arguments as of ``simulate``.
 
     Raises ConfigError.
     """
-    world = world_of(scenario, parameters.vehicle.radius)
-    return ClosedLoop(load_preset(plant), world, parameters, load_guard_parameters())
+    world = world or world_of(scenario, parameters.vehicle.radius)
+    guard = load_guard_parameters()
+    return ClosedLoop(any_preset(plant), world, parameters, guard, disturbance)
+
+
+def _world(options: argparse.Namespace, scenario: Scenario, radius: float) -> World:
+    """Return the surroundings in the scenario's file, also what moves."""
+    path = scenario_path(options.scenario)
+    data = load_yaml(path)
+    variant = (data.get("variants") or {}).get(scenario.variant, {})
+    obstacles = variant.get("obstacles", data.get("obstacles"))
+    return World.from_list(obstacles, radius, path.name)
 
 
 def _prepare(options: argparse.Namespace) -> Tuple[Scenario, Parameters]:
@@ -93,7 +138,7 @@ def _prepare(options: argparse.Namespace) -> Tuple[Scenario, Parameters]:
             else None
         )
     scenario = load_scenario(options.scenario, variant=variant)
-    load_preset(options.plant)
+    any_preset(options.plant)
     parameters = load_parameters(
         options.vehicle or options.plant, options.weights or scenario.weights
     )
@@ -118,8 +163,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--plant",
         default="dji_hil",
-        choices=preset_names(),
-        help="simulated aircraft (default: %(default)s)",
+        help=f"simulated aircraft: {', '.join(preset_names())}, or spread:SEED with --vehicle"
+        " (default: %(default)s)",
     )
     parser.add_argument("--vehicle", help="the controller's model of it (default: as the plant)")
     parser.add_argument("--variant", help="variant of the scenario")
@@ -130,6 +175,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--vehicle-radius", type=_radius, help="hull [m] (default: the vehicle's 0.5)"
+    )
+    parser.add_argument(
+        "--disturbance",
+        default="none",
+        metavar="LEVEL",
+        help=f"{', '.join(disturbance_names())}, or path of a YAML file (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--seed", type=_seed, default=0, help="of everything random (default: %(default)s)"
     )
     parser.add_argument("--json", type=Path, help="write the metrics to this file")
     parser.add_argument("--quiet", action="store_true", help="no progress, no table")
@@ -143,6 +197,13 @@ def _radius(text: str) -> float:
     return value
 
 
-def _fail(text: str) -> None:
+def _seed(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"got {text}, expected a whole number, 0 or more")
+    return value
+
+
+def _fail(text: str, status: int = 2) -> None:
     sys.stderr.write(f"simulate: {text}\n")
-    sys.exit(2)
+    sys.exit(status)

@@ -10,6 +10,8 @@ from geometry_msgs.msg import (
     PointStamped,
     Quaternion,
     QuaternionStamped,
+    Transform,
+    TransformStamped,
     Vector3,
     Vector3Stamped,
 )
@@ -19,9 +21,10 @@ from std_msgs.msg import Float32, Header, String, UInt8
 
 from nmpc_msgs.msg import Obstacle as ObstacleMsg
 from nmpc_msgs.msg import ObstacleArray
+from uav_sim.body import BodyState
 from uav_sim.m100 import Truth
-from uav_sim.obstacle import Obstacle
 from uav_sim.telemetry import quaternion, to_body
+from uav_sim.vicon import ViconPose
 from uav_sim.world import Collision
 
 _SHAPES = {"sphere": ObstacleMsg.SPHERE, "cylinder": ObstacleMsg.CYLINDER, "box": ObstacleMsg.BOX}
@@ -110,9 +113,11 @@ TELEMETRY: Dict[str, Kind] = {
 }
 
 
-def truth_to_odometry(stamp: rospy.Time, truth: Truth, frame_id: str) -> Odometry:
-    """Return the true pose in the world, and the true twist in ``base_link`` axes."""
-    message = Odometry(header=Header(0, stamp, frame_id), child_frame_id="base_link")
+def truth_to_odometry(
+    stamp: rospy.Time, truth: Truth, frame_id: str, child_frame_id: str = "base_link"
+) -> Odometry:
+    """Return the true pose in the world, and the true twist in axes of the body."""
+    message = Odometry(header=Header(0, stamp, frame_id), child_frame_id=child_frame_id)
     message.pose.pose.position = Point(*truth.position)
     message.pose.pose.orientation = Quaternion(*quaternion(*truth.rpy))
     message.twist.twist.linear = Vector3(*to_body(truth.rpy, truth.velocity))
@@ -121,20 +126,30 @@ def truth_to_odometry(stamp: rospy.Time, truth: Truth, frame_id: str) -> Odometr
 
 
 def obstacles_to_msg(
-    stamp: rospy.Time, t: float, obstacles: Sequence[Obstacle], frame_id: str
+    stamp: rospy.Time, states: Sequence[BodyState], frame_id: str
 ) -> ObstacleArray:
-    """Return the obstacles as they are at simulated time ``t`` [s]."""
+    """Return obstacles as they are at the time of the stamp."""
     message = ObstacleArray(header=Header(0, stamp, frame_id))
-    for obstacle in obstacles:
+    for obstacle, position, velocity in states:
         message.obstacles.append(
             ObstacleMsg(
                 id=obstacle.id,
                 shape=_SHAPES[obstacle.shape],
                 size=list(obstacle.size),
-                position=Point(*obstacle.position_at(t)),
-                velocity=Vector3(*obstacle.velocity),
+                position=Point(*position),
+                velocity=Vector3(*velocity),
             )
         )
+    return message
+
+
+def pose_to_transform(
+    stamp: rospy.Time, pose: ViconPose, frame_id: str, child_frame_id: str
+) -> TransformStamped:
+    """Return a captured pose; vicon_bridge stamps it with the time of capture."""
+    message = TransformStamped(Header(0, stamp, frame_id), child_frame_id, Transform())
+    message.transform.translation = Vector3(*pose.position)
+    message.transform.rotation = Quaternion(*pose.orientation)
     return message
 
 

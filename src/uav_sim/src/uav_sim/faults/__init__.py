@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""What can go wrong with a simulated M100, on command or by schedule (doc/faults.md)."""
