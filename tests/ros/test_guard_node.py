@@ -22,6 +22,7 @@ def flight(ros):
     return ros
 
 
+@pytest.mark.alone
 def test_a_dead_controller_leaves_a_held_aircraft_that_still_lands(flight):
     bare = flight.start(sys.executable, str(Path(__file__).parent / "bare_stream.py"))
     seen = flight.run_json("guard_client.py", "controller_dies", timeout=120)

@@ -35,6 +35,7 @@ ABSENT_ON_M100 = (
 )
 
 
+@pytest.mark.alone
 def test_topics_as_a_foreign_client_sees_them(ros):
     ros.launch("uav_sim", "simulator.launch")
     ros.wait_for_node("/uav_sim")
