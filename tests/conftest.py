@@ -14,13 +14,15 @@ from typing import Iterator, List
 import pytest
 
 _NICENESS = 10
+_GIVES_WAY = pytest.StashKey[bool]()
 
 
-def pytest_collection_modifyitems(items: List[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: List[pytest.Item]) -> None:
     """Put the tests with ROS into one group: the largest, which is handed out first."""
-    for item in items:
-        if item.get_closest_marker("ros"):
-            item.add_marker(pytest.mark.xdist_group("ros"))
+    with_ros = [item for item in items if item.get_closest_marker("ros")]
+    for item in with_ros:
+        item.add_marker(pytest.mark.xdist_group("ros"))
+    config.stash[_GIVES_WAY] = hasattr(config, "workerinput") and bool(with_ros)
 
 
 @pytest.hookimpl(hookwrapper=True, tryfirst=True)  # outside the time limit of the test
@@ -31,7 +33,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     with ExitStack() as machine:
         with _locked(folder / "door", fcntl.LOCK_EX):  # else a stream of others never ends
             machine.enter_context(_locked(folder / "room", how))
-        if hasattr(item.config, "workerinput") and not item.get_closest_marker("ros"):
+        if item.config.stash[_GIVES_WAY] and not item.get_closest_marker("ros"):
             os.nice(max(0, _NICENESS - os.nice(0)))
         yield
 

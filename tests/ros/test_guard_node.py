@@ -16,8 +16,10 @@ def flight(ros):
     """Simulator, controller and guard; the guard ends only when a test ends it."""
     ros.launch("uav_sim", "simulator.launch")
     ros.wait_for_node("/uav_sim")
-    for name in ("flight_guard", "nmpc_controller"):
+    nodes = ("flight_guard", "nmpc_controller")
+    for name in nodes:
         ros.start("rosrun", "nmpc_control", name, "_vehicle:=dji_hil")
+    for name in nodes:
         ros.wait_for_node(f"/{name}")
     return ros
 
