@@ -8,7 +8,7 @@ export SPEED ?= 1.0
 RVIZ ?=
 in_workspace := . devel/setup.bash &&
 single_thread := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
-two_workers := -n 2 --dist loadgroup
+two_workers := -n 2 --dist loadscope
 
 .PHONY: help build fly bench test lint clean
 

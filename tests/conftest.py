@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""How tests share the machine when several workers run them (``pytest -n 2 --dist loadgroup``).
+"""How tests share the machine when several workers run them (``pytest -n 2 --dist loadscope``).
 
-Tests with ROS run on one worker, one after the other, and first, because that takes longest. The
-other workers give way to their nodes. Beside a test marked ``alone`` nothing runs at all.
+One worker takes tests/ros, one after the other and first, because that takes longest. Meanwhile
+the others give way to its nodes. Beside a test marked ``alone`` nothing else runs at all.
 """
 
 import fcntl
 import os
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Iterator, List
+from typing import Any, Iterator, List
 
 import pytest
 
@@ -17,12 +17,29 @@ _NICENESS = 10
 _GIVES_WAY = pytest.StashKey[bool]()
 
 
+def _with_ros(nodeid: str) -> bool:
+    return nodeid.startswith("tests/ros/")
+
+
+@pytest.hookimpl(optionalhook=True)  # of pytest-xdist
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Return a scheduler that hands out tests/ros as a whole, and all other tests one by one."""
+    if config.getvalue("dist") != "loadscope":
+        return None
+    from xdist.scheduler import LoadScopeScheduling
+
+    class RosFirst(LoadScopeScheduling):
+        # xdist_group would do, but has no effect with pytest 9.2
+        def _split_scope(self, nodeid: str) -> str:
+            return "ros" if _with_ros(nodeid) else nodeid  # the largest scope comes first
+
+    return RosFirst(config, log)
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: List[pytest.Item]) -> None:
-    """Put the tests with ROS into one group: the largest, which is handed out first."""
-    with_ros = [item for item in items if item.get_closest_marker("ros")]
-    for item in with_ros:
-        item.add_marker(pytest.mark.xdist_group("ros"))
-    config.stash[_GIVES_WAY] = hasattr(config, "workerinput") and bool(with_ros)
+    """Note whether there are flights to give way to."""
+    flights = any(_with_ros(item.nodeid) for item in items)
+    config.stash[_GIVES_WAY] = flights and hasattr(config, "workerinput")
 
 
 @pytest.hookimpl(hookwrapper=True, tryfirst=True)  # outside the time limit of the test
@@ -33,7 +50,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     with ExitStack() as machine:
         with _locked(folder / "door", fcntl.LOCK_EX):  # else a stream of others never ends
             machine.enter_context(_locked(folder / "room", how))
-        if item.config.stash[_GIVES_WAY] and not item.get_closest_marker("ros"):
+        if item.config.stash[_GIVES_WAY] and not _with_ros(item.nodeid):
             os.nice(max(0, _NICENESS - os.nice(0)))
         yield
 
