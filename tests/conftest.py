@@ -14,7 +14,7 @@ from typing import Any, Iterator, List
 import pytest
 
 _NICENESS = 10
-_GIVES_WAY = pytest.StashKey[bool]()
+_BESIDE_FLIGHTS = pytest.StashKey[bool]()
 
 
 def _with_ros(nodeid: str) -> bool:
@@ -37,21 +37,24 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: List[pytest.Item]) -> None:
-    """Note whether there are flights to give way to."""
+    """Note whether this is one of several workers, with flights on one of them."""
     flights = any(_with_ros(item.nodeid) for item in items)
-    config.stash[_GIVES_WAY] = flights and hasattr(config, "workerinput")
+    config.stash[_BESIDE_FLIGHTS] = flights and hasattr(config, "workerinput")
 
 
 @pytest.hookimpl(hookwrapper=True, tryfirst=True)  # outside the time limit of the test
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     """Wait until the test may run beside what the other workers are doing."""
+    if not item.config.stash[_BESIDE_FLIGHTS]:
+        yield
+        return
+    if not _with_ros(item.nodeid):
+        os.nice(max(0, _NICENESS - os.nice(0)))
     folder = item.config.cache.mkdir("workers")
     how = fcntl.LOCK_EX if item.get_closest_marker("alone") else fcntl.LOCK_SH
     with ExitStack() as machine:
         with _locked(folder / "door", fcntl.LOCK_EX):  # else a stream of others never ends
             machine.enter_context(_locked(folder / "room", how))
-        if item.config.stash[_GIVES_WAY] and not _with_ros(item.nodeid):
-            os.nice(max(0, _NICENESS - os.nice(0)))
         yield
 
 
