@@ -8,6 +8,7 @@ export SPEED ?= 1.0
 RVIZ ?=
 in_workspace := . devel/setup.bash &&
 single_thread := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+two_workers := -n 2 --dist loadscope
 
 .PHONY: help build fly bench test lint clean
 
@@ -32,7 +33,7 @@ bench: build
 
 test: lint
 	@$(single_thread) .setup/python38.sh
-	@$(in_workspace) $(single_thread) .venv/bin/python3 -m pytest tests $(PYTEST_ARGS)
+	@$(in_workspace) $(single_thread) .venv/bin/python3 -m pytest tests $(two_workers) $(PYTEST_ARGS)
 
 lint: build
 	@.venv/bin/ruff check --quiet --output-format concise .

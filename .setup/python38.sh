@@ -13,7 +13,7 @@ for interpreter in "$(command -v python3.8 || true)" "$(pyenv root 2>/dev/null |
     .setup/python.sh .venv38 "$interpreter"
     echo "[test] core on $(.venv38/bin/python3 --version)"
     # shellcheck disable=SC2086
-    exec env -u PYTHONPATH .venv38/bin/python3 -m pytest tests/unit ${PYTEST_ARGS:-}
+    exec env -u PYTHONPATH .venv38/bin/python3 -m pytest tests/unit -n 2 --dist worksteal ${PYTEST_ARGS:-}
   fi
 done
 echo "[test] no Python 3.8 on this machine: the core is tested on $(.venv/bin/python3 --version) alone"

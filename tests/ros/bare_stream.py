@@ -18,7 +18,7 @@ def main() -> None:
         while not rospy.is_shutdown():
             now = rospy.Time.now()
             publisher.publish(Joy(axes=[0.0] * 5))
-            if last is not None:
+            if last:  # 0 until the first /clock has come
                 longest = max(longest, (now - last).to_sec())
             last = now
             rate.sleep()

@@ -96,6 +96,7 @@ def multi_obstacle(tmp_path_factory) -> Flight:
     return fly(tmp_path_factory.mktemp("multi_obstacle"), "multi_obstacle", bare=True)
 
 
+@pytest.mark.alone
 def test_hexagon_is_flown_on_its_path_and_round_its_corners(hexagon):
     assert hexagon.status == 0, hexagon.output
     metrics = hexagon.metrics
@@ -107,6 +108,7 @@ def test_hexagon_is_flown_on_its_path_and_round_its_corners(hexagon):
     assert np.all(corner_distances(hexagon, corners) <= 0.5)
 
 
+@pytest.mark.alone
 def test_multi_obstacle_arrives_and_keeps_away_from_the_spheres(multi_obstacle):
     assert multi_obstacle.status == 0, multi_obstacle.output
     metrics = multi_obstacle.metrics
@@ -118,6 +120,7 @@ def test_multi_obstacle_arrives_and_keeps_away_from_the_spheres(multi_obstacle):
     assert min(metrics["clearance_m"].values()) >= 0.4
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("name", ["hexagon", "multi_obstacle"])
 def test_commands_leave_at_a_steady_rate(name, request):
     flight = request.getfixturevalue(name)

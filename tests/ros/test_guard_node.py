@@ -16,12 +16,15 @@ def flight(ros):
     """Simulator, controller and guard; the guard ends only when a test ends it."""
     ros.launch("uav_sim", "simulator.launch")
     ros.wait_for_node("/uav_sim")
-    for name in ("flight_guard", "nmpc_controller"):
+    nodes = ("flight_guard", "nmpc_controller")
+    for name in nodes:
         ros.start("rosrun", "nmpc_control", name, "_vehicle:=dji_hil")
+    for name in nodes:
         ros.wait_for_node(f"/{name}")
     return ros
 
 
+@pytest.mark.alone
 def test_a_dead_controller_leaves_a_held_aircraft_that_still_lands(flight):
     bare = flight.start(sys.executable, str(Path(__file__).parent / "bare_stream.py"))
     seen = flight.run_json("guard_client.py", "controller_dies", timeout=120)

@@ -91,6 +91,7 @@ MEDIUM = FAST | {"rc", "gps_position", "local_position", "velocity", "gimbal_ang
 SLOW = MEDIUM | {"battery_state"}
 
 
+@pytest.mark.alone
 def test_topics_and_services_as_a_foreign_client_sees_them(ros):
     ros.launch("uav_sim", "simulator.launch")
     ros.wait_for_node("/uav_sim")

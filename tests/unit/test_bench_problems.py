@@ -136,10 +136,10 @@ def test_defect_is_what_a_plan_violates(recorded, solver):
     assert defect == pytest.approx(0.01)
 
 
-def test_paper_backend_sees_the_same_spheres():
+def test_paper_backend_sees_the_same_spheres(recorded):
     scenario = load_scenario("multi_obstacle")
     parameters = load_parameters(PLANT, scenario.weights)
-    problem = recorded_problems(1, until=0.05)["multi_obstacle"][0]
+    problem = recorded["multi_obstacle"][0]
     assert structure_of(parameters) == problem.structure
     spheres = PaperBackend(parameters)._spheres(problem.instance)
     expected = {(*o.position, o.size[0]) for o in scenario.obstacles}
