@@ -58,15 +58,23 @@ def _imu(message: Any) -> Sequence[float]:
 
 def _setpoint(message: Any) -> Sequence[float]:
     """Return thrust [percent], roll, pitch [rad], yaw rate [rad/s]; NaN if the flag says other."""
-    x, y, z, yaw, flag = (float(axis) for axis in message.axes[:5])
-    if not all(map(math.isfinite, (x, y, z, yaw, flag))):
+    return _flagged(message, int(message.axes[4]))
+
+
+def _flagged(message: Any, flag: int) -> Sequence[float]:
+    """Return the same of axes whose meaning a control byte gives.
+
+    Angles in the ground frame tilt towards north and east: they are no roll and pitch.
+    """
+    x, y, z, yaw = (float(axis) for axis in message.axes[:4])
+    if not all(map(math.isfinite, (x, y, z, yaw))):
         raise ValueError("a setpoint that is not finite")
-    bits = int(flag)
-    is_angle, is_thrust, is_rate = bits & 0xC0 == 0x00, bits & 0x30 == 0x20, bool(bits & 0x08)
+    is_body_angle = flag & 0xC0 == 0x00 and flag & 0x06 == 0x02
+    is_thrust, is_rate = flag & 0x30 == 0x20, bool(flag & 0x08)
     return (
         z if is_thrust else math.nan,
-        x if is_angle else math.nan,
-        y if is_angle else math.nan,
+        x if is_body_angle else math.nan,
+        y if is_body_angle else math.nan,
         yaw if is_rate else math.nan,
     )
 
@@ -78,14 +86,20 @@ ROWS: Dict[str, Tuple[int, Callable[[Any], Sequence[float]]]] = {
     "status": (3, lambda m: (m.mode, m.plans_rejected, m.deadline_misses)),
     "plan": (3, lambda m: (m.iterations, m.solve_time, m.found)),
     "setpoint": (4, _setpoint),
+    "height_setpoint": (4, lambda m: _flagged(m, 0x1B)),
+    "velocity_setpoint": (4, lambda m: _flagged(m, 0x49)),
+    "position_setpoint": (4, lambda m: _flagged(m, 0x91)),
     "mav_command": (4, lambda m: (m.thrust.z, m.roll, m.pitch, m.yaw_rate)),
     "attitude": (4, lambda m: _xyzw(m.quaternion)),
     "imu": (10, _imu),
     "velocity": (3, lambda m: _xyz(m.vector)),
     "local_position": (3, lambda m: _xyz(m.point)),
     "flight_status": (1, lambda m: (m.data,)),
+    "rc": (6, lambda m: [m.axes[i] for i in range(6)]),
+    "battery": (1, lambda m: (m.percentage,)),
 }
-NAN_MEANS_ABSENT = ("setpoint",)  # roles whose rows may hold NaN
+SETPOINTS = ("setpoint", "height_setpoint", "velocity_setpoint", "position_setpoint")
+NAN_MEANS_ABSENT = SETPOINTS  # roles whose rows may hold NaN
 
 
 def _trajectory(message: Any) -> Trajectory:

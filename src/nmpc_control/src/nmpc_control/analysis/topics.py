@@ -20,11 +20,22 @@ ROLES = {
     "obstacles": Role("nmpc/obstacles", "nmpc_msgs/msg/ObstacleArray"),
     "sensed_obstacles": Role("obstacles", "nmpc_msgs/msg/ObstacleArray"),
     "setpoint": Role("dji_sdk/flight_control_setpoint_generic", "sensor_msgs/msg/Joy"),
+    "height_setpoint": Role(
+        "dji_sdk/flight_control_setpoint_rollpitch_yawrate_zposition", "sensor_msgs/msg/Joy"
+    ),
+    "velocity_setpoint": Role(
+        "dji_sdk/flight_control_setpoint_ENUvelocity_yawrate", "sensor_msgs/msg/Joy"
+    ),
+    "position_setpoint": Role(
+        "dji_sdk/flight_control_setpoint_ENUposition_yaw", "sensor_msgs/msg/Joy"
+    ),
     "attitude": Role("dji_sdk/attitude", "geometry_msgs/msg/QuaternionStamped"),
     "imu": Role("dji_sdk/imu", "sensor_msgs/msg/Imu"),
     "velocity": Role("dji_sdk/velocity", "geometry_msgs/msg/Vector3Stamped"),
     "local_position": Role("dji_sdk/local_position", "geometry_msgs/msg/PointStamped"),
     "flight_status": Role("dji_sdk/flight_status", "std_msgs/msg/UInt8"),
+    "rc": Role("dji_sdk/rc", "sensor_msgs/msg/Joy"),
+    "battery": Role("dji_sdk/battery_state", "sensor_msgs/msg/BatteryState"),
     "truth": Role("uav_sim/ground_truth", "nav_msgs/msg/Odometry"),
     "collision": Role("uav_sim/collision", "std_msgs/msg/String"),
 }
