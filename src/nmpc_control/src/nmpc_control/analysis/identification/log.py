@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""What identification needs of one bag: commands, what followed, and who was flying."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Dict, Optional, Tuple
+
+import numpy as np
+
+from nmpc_control.analysis import recording as reading
+from nmpc_control.analysis.messages import IMU_QUATERNION, SETPOINTS
+from nmpc_control.analysis.quaternions import rpy_of
+from nmpc_control.analysis.record import Series
+from nmpc_control.analysis.recording import Progress, Recording
+from nmpc_control.analysis.source import is_hardware_in_the_loop
+from nmpc_control.errors import BagError
+
+SHORTEST = 3.0  # [s] of attitude and commands
+
+
+@dataclass(frozen=True)
+class Log:
+    """One bag. One clock, which starts with the bag; attitudes ENU to FLU, yaw unwrapped."""
+
+    bag: str  # name of the file
+    source: str  # "simulation", "hil" or "flight"
+    commands: Series  # (n, 4) thrust [percent], roll, pitch [rad], yaw rate [rad/s]; NaN: not given
+    attitude: Series  # (n, 3) [rad] roll, pitch, yaw
+    velocity: Optional[Series] = None  # (n, 3) [m/s] ENU
+    imu: Optional[Series] = None  # (n, 10) as in messages.py
+    battery: Optional[Series] = None  # (n, 1) [percent]
+    rc: Optional[Series] = None  # (n, 6) raw axes
+    flight_status: Optional[Series] = None  # (n, 1)
+    status: Optional[Series] = None  # (n, 3) of this project's guard
+    remarks: Tuple[str, ...] = ()
+
+
+def read_log(
+    path: Path, namespace: Optional[str] = None, progress: Optional[Progress] = None
+) -> Log:
+    """Return what a bag says for identification.
+
+    Raises:
+        BagError: it cannot be read, or has no commands or attitudes of a few seconds together.
+    """
+    recording = reading.read(Path(path), namespace, progress)
+    rows, remarks = recording.rows, list(recording.remarks)
+    commands, attitude = _commands(rows), _attitude(rows)
+    first = max(commands.times[0], attitude.times[0])
+    last = min(commands.times[-1], attitude.times[-1])
+    if last - first < SHORTEST:
+        together = max(0.0, last - first)
+        raise BagError(
+            f"commands and attitude are together for {together:.1f} s, expected {SHORTEST:g} or more"
+        )
+    if "mav_command" in rows and "setpoint" not in rows:
+        remarks.append("mav_msgs commands: their thrust.z is taken as percent")
+    return Log(
+        bag=Path(path).name,
+        source=_source(recording, remarks),
+        commands=commands,
+        attitude=attitude,
+        velocity=rows.get("velocity"),
+        imu=rows.get("imu"),
+        battery=rows.get("battery"),
+        rc=rows.get("rc"),
+        flight_status=rows.get("flight_status"),
+        status=rows.get("status"),
+        remarks=tuple(remarks),
+    )
+
+
+def _commands(rows: Dict[str, Series]) -> Series:
+    """Return the stream of commands, the newest of any topic in effect."""
+    roles = ("mav_command",) if "mav_command" in rows else SETPOINTS
+    found = [rows[role] for role in roles if role in rows and len(rows[role])]
+    if not found:
+        raise BagError(
+            "no commands: expected a dji_sdk/flight_control_setpoint_* topic (sensor_msgs/Joy) or "
+            "mav_msgs/RollPitchYawrateThrust"
+        )
+    times = np.concatenate([series.times for series in found])
+    return Series(times, np.concatenate([series.values for series in found]))
+
+
+def _attitude(rows: Dict[str, Series]) -> Series:
+    source = next((rows[role] for role in ("attitude", "imu") if role in rows), None)
+    if source is None:
+        raise BagError("no attitude: expected dji_sdk/attitude or dji_sdk/imu")
+    angles = rpy_of(source.values[:, IMU_QUATERNION])
+    is_finite = np.isfinite(angles).all(axis=1)
+    if not is_finite.any():
+        raise BagError("no attitude: all quaternions have length zero")
+    angles = angles[is_finite]
+    angles[:, 2] = np.unwrap(angles[:, 2])
+    return Series(source.times[is_finite], angles)
+
+
+def _source(recording: Recording, remarks: list) -> str:
+    if recording.selection.is_simulation:
+        return "simulation"
+    verdict = is_hardware_in_the_loop(recording.rows["imu"]) if "imu" in recording.rows else None
+    if verdict is None:
+        remarks.append("no imu data in motion: hardware in the loop cannot be told from a flight")
+    return "hil" if verdict else "flight"
