@@ -14,7 +14,7 @@ from scipy.stats import t as student
 
 from nmpc_control.analysis.identification.estimate import Interval
 
-BLOCK = 2.0  # [s]
+BLOCK = 1.0  # [s]
 FEWEST_BLOCKS = 5
 
 
@@ -33,7 +33,7 @@ def block_covariance(
     """
     names, index = np.unique(blocks, return_inverse=True)
     count, size = len(names), jacobian.shape[1]
-    if count < max(FEWEST_BLOCKS, size + 1):
+    if count < max(FEWEST_BLOCKS, size + 2):
         return None
     scale = np.linalg.norm(jacobian, axis=0)
     if not np.isfinite(jacobian).all() or (scale == 0.0).any():

@@ -51,7 +51,7 @@ def read_log(
     if last - first < SHORTEST:
         together = max(0.0, last - first)
         raise BagError(
-            f"commands and attitude are together for {together:.1f} s, expected {SHORTEST:g} or more"
+            f"commands and attitude go together for {together:.1f} s, expected {SHORTEST:g} or more"
         )
     if "mav_command" in rows and "setpoint" not in rows:
         remarks.append("mav_msgs commands: their thrust.z is taken as percent")

@@ -25,23 +25,15 @@ class ResponseModel:
     axes: int
     has_limit: bool = False
     shares_dead_time: bool = False
-    dead_time: Optional[float] = None  # [s] given, not fitted
-
-    @property
-    def size(self) -> int:
-        """Number of fitted parameters."""
-        return len(self._pack(np.zeros((self.axes, len(self.order.names))), 0.0))
 
     def unpack(self, p: np.ndarray) -> Tuple[np.ndarray, float]:
         """Return the axes' parameters (axes, k) in the order's names, and the limit."""
         limit = float(p[-1]) if self.has_limit else np.inf
         p = p[:-1] if self.has_limit else p
-        if self.dead_time is None and not self.shares_dead_time:
+        if not self.shares_dead_time:
             return p.reshape(self.axes, -1), limit
-        dead_time = self.dead_time if self.dead_time is not None else p[-1]
-        p = p if self.dead_time is not None else p[:-1]
-        rows = p.reshape(self.axes, -1)
-        return np.column_stack([rows, np.full(self.axes, dead_time)]), limit
+        rows = p[:-1].reshape(self.axes, -1)
+        return np.column_stack([rows, np.full(self.axes, p[-1])]), limit
 
     def bounds(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return lower bounds, upper bounds and typical sizes of the fitted parameters."""
@@ -51,19 +43,15 @@ class ResponseModel:
         return low, high, typical
 
     def _pack(self, rows: np.ndarray, limit: float) -> np.ndarray:
-        if self.dead_time is not None:
-            p = rows[:, :-1].ravel()
-        elif self.shares_dead_time:
+        p = rows.ravel()
+        if self.shares_dead_time:
             p = np.append(rows[:, :-1].ravel(), rows[:, -1].mean())
-        else:
-            p = rows.ravel()
         return np.append(p, limit) if self.has_limit else p
 
     def start(self, passages: Sequence[Passage]) -> np.ndarray:
         """Return where to begin: the best of a grid, with the gains that fit best."""
         largest = max(np.linalg.norm(passage.commands, axis=1).max() for passage in passages)
         limits = [largest * share for share in _LIMIT_SHARES] if self.has_limit else [np.inf]
-        dead_times = _DEAD_TIMES if self.dead_time is None else [self.dead_time]
         best, chosen = np.inf, None
         for limit in limits:
             inputs = [passage.inputs(limit) for passage in passages]
@@ -72,7 +60,7 @@ class ResponseModel:
                     [p.outputs(self.order, shape, u[:, axis]) for axis in range(self.axes)]
                     for p, u in zip(passages, inputs)
                 ]
-                for dead_time in dead_times:
+                for dead_time in _DEAD_TIMES:
                     gains, cost = _best_gains(passages, outputs, dead_time)
                     if cost < best:
                         rows = np.column_stack(
@@ -153,6 +141,7 @@ def fit(
         xtol=1e-6,
         ftol=1e-8,
         max_nfev=60,
+        tr_solver="lsmr",  # of few columns: a decomposition would only keep threads waiting
     )
     return Fit(model, result.x, result.jac, result.fun)
 

@@ -110,4 +110,3 @@ def _follows(passage: Passage, model: np.ndarray) -> np.ndarray:
 def _moving_mean(x: np.ndarray, count: int) -> np.ndarray:
     count = min(count, len(x))
     return np.convolve(x, np.ones(count) / count, mode="same")
-

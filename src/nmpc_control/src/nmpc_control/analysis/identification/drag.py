@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""Linear drag along the heading, from horizontal motion under a known thrust.
+
+    mean(v') - mean(T e_z) = -forward mean(v_f) h - sideways mean(v_s) n + b
+
+h and n are the heading and its left in the world, e_z the body's z axis; the constant b takes what
+steady wind does, which is not drag of the aircraft's own motion.
+"""
+
+from dataclasses import dataclass, field
+from typing import List, Optional, Sequence
+
+import numpy as np
+
+from nmpc_control.analysis.identification.confidence import BLOCK, block_covariance, intervals
+from nmpc_control.analysis.identification.estimate import Estimate, unidentified
+from nmpc_control.analysis.identification.robust import (
+    LinearFit,
+    r_squared,
+    trimmed_least_squares,
+)
+from nmpc_control.analysis.identification.thrust import Thrust
+from nmpc_control.analysis.identification.translation import Motion
+
+NAMES = ("forward", "sideways")
+FIGURES = (*NAMES, "steady_x", "steady_y", "r2", "speed_rms")
+_MOVED = 0.5  # [m/s] rms of the speed along an axis below this tells no drag
+_LOOSE = 0.05  # [1/s] half of the interval
+
+
+@dataclass(frozen=True)
+class Drag:
+    """What is known of horizontal drag."""
+
+    estimate: Estimate
+    motions: List[Motion] = field(default_factory=list)
+    target: Optional[np.ndarray] = None  # (2 w,) [m/s^2] acceleration that thrust does not explain
+    fit: Optional[LinearFit] = None
+
+
+def identify_drag(thrust: Thrust) -> Drag:
+    """Return what horizontal motion tells of drag, given the thrust map."""
+    if thrust.map is None:
+        return Drag(unidentified(FIGURES, NAMES, "needs the thrust map, which is not identified"))
+    motions, thrust_map = thrust.motions, thrust.map
+    accelerations, targets, columns, speeds = [], [], [], []
+    for motion in motions:
+        force = thrust_map.thrust(motion.percent(thrust_map.dead_time))[:, None] * motion.up[:, :2]
+        own = motion.acceleration[:, :2]
+        accelerations.append(own.T.ravel())
+        targets.append((own - motion.mean(force)).T.ravel())
+        columns.append(_columns(motion))
+        speeds.append(_along_heading(motion))
+    target, matrix = np.concatenate(targets), np.concatenate(columns)
+    found = trimmed_least_squares(matrix, target)
+    used, speed = found.used, np.sqrt(np.mean(np.concatenate(speeds) ** 2, axis=0))
+    blocks = np.concatenate([np.tile(motion.blocks(BLOCK), 2) for motion in motions])
+    covariance = block_covariance(-matrix[used], found.residuals[used], blocks[used])
+    names = (*NAMES, "steady_x", "steady_y")
+    spans = intervals(names, found.parameters, covariance)
+    values = {name: float(value) for name, value in zip(names, found.parameters)}
+    values["r2"] = r_squared(np.concatenate(accelerations)[used], found.residuals[used])
+    values["speed_rms"] = float(np.linalg.norm(speed))
+    estimate = Estimate(values, {name: spans[name] for name in NAMES})
+    for name, moved in zip(NAMES, speed):
+        interval = spans[name]
+        if moved < _MOVED:
+            reason = f"{name} velocity stayed below {_MOVED:g} m/s rms"
+            estimate = estimate.without((name,), reason)
+        elif interval is None or interval[1] - interval[0] > 2.0 * _LOOSE:
+            estimate = estimate.without((name,), f"the data leave drag {name} open")
+    return Drag(estimate, motions, target, found)
+
+
+def _along_heading(motion: Motion) -> np.ndarray:
+    """Return forward and left velocity (m, 2) [m/s], mean in each interval of the grid."""
+    (vx, vy), (c, s) = motion.velocity[:, :2].T, motion.heading.T
+    at_points = np.stack([c * vx + s * vy, c * vy - s * vx], axis=1)
+    return 0.5 * (at_points[1:] + at_points[:-1])
+
+
+def _columns(motion: Motion) -> np.ndarray:
+    """Return what the parameters multiply (2 w, 4): first all of x, then all of y."""
+    speeds, heading = _along_heading(motion), 0.5 * (motion.heading[1:] + motion.heading[:-1])
+    forward = motion.mean(-speeds[:, :1] * heading)
+    left = motion.mean(-speeds[:, 1:] * heading[:, ::-1] * np.array([-1.0, 1.0]))
+    count = len(forward)
+    steady = np.kron(np.eye(2), np.ones((count, 1)))
+    return np.column_stack([forward.T.ravel(), left.T.ravel(), steady])
+
+
+def mean_drag(drags: Sequence[Optional[float]]) -> Optional[float]:
+    """Return the mean of the drags [1/s] that are known, or None."""
+    known = [drag for drag in drags if drag is not None]
+    return float(np.mean(known)) if known else None

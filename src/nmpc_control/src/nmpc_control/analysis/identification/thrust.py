@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""Affine map from DJI's thrust percentage to acceleration, its dead time, and vertical drag.
+
+    mean(vz') + g = slope mean(u(t - d) c) + offset mean(c) - k mean(vz),   c = cos(roll) cos(pitch)
+
+Where the battery fell far enough, the offset may move with it.
+"""
+
+from dataclasses import dataclass, field
+from typing import List, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from nmpc_control.analysis.identification.confidence import (
+    BLOCK,
+    block_covariance,
+    intervals,
+    is_loose,
+)
+from nmpc_control.analysis.identification.estimate import Estimate, unidentified
+from nmpc_control.analysis.identification.response import LONGEST_DEAD_TIME
+from nmpc_control.analysis.identification.robust import (
+    LinearFit,
+    r_squared,
+    trimmed_least_squares,
+)
+from nmpc_control.analysis.identification.translation import Motion
+from nmpc_control.state import GRAVITY
+
+NAMES = ("slope", "offset", "dead_time_s")
+FIGURES = (*NAMES, "hover_percent", "r2")
+VERTICAL = "vertical"
+_EXCITED = 1.0  # [percent] standard deviation of thrust below this tells no slope
+_MOVED = 0.3  # [m/s] rms of the vertical velocity below this tells no drag
+_FEWEST = 50  # windows
+_LOOSE = 0.2  # [1]
+_LOOSE_DEAD_TIME = 0.05  # [s]
+_SCAN = np.arange(0.0, LONGEST_DEAD_TIME + 1e-9, 0.02)  # [s]
+
+
+class Map(NamedTuple):
+    """The numbers alone, for what builds on them."""
+
+    slope: float  # [m/s^2 per percent]
+    offset: float  # [m/s^2]
+    dead_time: float  # [s]
+    vertical_drag: float  # [1/s]
+
+    def thrust(self, percent: np.ndarray) -> np.ndarray:
+        """Return the acceleration [m/s^2] of percentages."""
+        return self.slope * percent + self.offset
+
+
+@dataclass(frozen=True)
+class Thrust:
+    """What is known of thrust and vertical drag."""
+
+    estimate: Estimate
+    vertical_drag: Estimate
+    map: Optional[Map] = None
+    motions: List[Motion] = field(default_factory=list)
+    fit: Optional[LinearFit] = None
+
+
+def identify_thrust(motions: List[Motion]) -> Thrust:
+    """Return what vertical motion tells of thrust."""
+    reason = _objection(motions)
+    if reason:
+        return Thrust(
+            unidentified(FIGURES, NAMES, reason), unidentified((VERTICAL,), (VERTICAL,), reason)
+        )
+    target = np.concatenate([m.acceleration[:, 2] for m in motions]) + GRAVITY
+    climb = np.concatenate([m.mean(m.speed[:, 2]) for m in motions])
+    has_drag = bool(np.sqrt(np.mean(climb**2)) > _MOVED)
+    dead_time, found = _best_dead_time(motions, target, has_drag)
+    parameters = np.append(found.parameters, dead_time)
+    names = ("slope", "offset", *([VERTICAL] if has_drag else []), "dead_time_s")
+    spans = intervals(names, parameters, _covariance(motions, dead_time, found, has_drag))
+    slope, offset = (float(x) for x in found.parameters[:2])
+    drag = float(found.parameters[2]) if has_drag else 0.0
+    used = found.used
+    values = {
+        "slope": slope,
+        "offset": offset,
+        "dead_time_s": dead_time,
+        "hover_percent": (GRAVITY - offset) / slope if slope else None,
+        "r2": r_squared(target[used], found.residuals[used]),
+    }
+    estimate = Estimate(values, {name: spans[name] for name in NAMES})
+    if slope <= 0.0 or is_loose(slope, spans["slope"], _LOOSE):
+        reason = "the data leave the slope open: thrust must rise and fall more, and for longer"
+        estimate = estimate.without(FIGURES, reason)
+        return Thrust(estimate, unidentified((VERTICAL,), (VERTICAL,), reason))
+    if is_loose(dead_time, spans["dead_time_s"], 0.0, _LOOSE_DEAD_TIME):
+        estimate = estimate.without(("dead_time_s",), "the data leave the dead time open")
+    if has_drag:
+        vertical = Estimate({VERTICAL: drag}, {VERTICAL: spans[VERTICAL]})
+    else:
+        slow = f"vertical velocity stayed below {_MOVED:g} m/s rms"
+        vertical = unidentified((VERTICAL,), (VERTICAL,), slow)
+    return Thrust(estimate, vertical, Map(slope, offset, dead_time, drag), motions, found)
+
+
+def _objection(motions: Sequence[Motion]) -> str:
+    """Return why nothing can be told; empty if something can."""
+    windows = sum(len(motion.times) for motion in motions)
+    if windows < _FEWEST:
+        return "no part in flight with thrust commands and velocity that is long enough"
+    moved = float(np.concatenate([motion.mean(motion.percent(0.0)) for motion in motions]).std())
+    if moved < _EXCITED:
+        return f"no excitation: thrust moved by {moved:.2f} percent rms, expected {_EXCITED:g}"
+    return ""
+
+
+def _columns(motions: Sequence[Motion], dead_time: float, has_drag: bool) -> np.ndarray:
+    rows = []
+    for motion in motions:
+        up = motion.up[:, 2]
+        parts = [motion.percent(dead_time) * up, up, -motion.speed[:, 2]]
+        rows.append(motion.mean(np.stack(parts[: 3 if has_drag else 2], axis=1)))
+    return np.concatenate(rows)
+
+
+def _best_dead_time(
+    motions: Sequence[Motion], target: np.ndarray, has_drag: bool
+) -> Tuple[float, LinearFit]:
+    """Return the dead time [s] that fits best, to a fraction of a sample, and the fit with it."""
+
+    def solve(dead_time: float) -> LinearFit:
+        return trimmed_least_squares(_columns(motions, dead_time, has_drag), target)
+
+    def cost(dead_time: float) -> float:
+        return float(np.median(np.abs(solve(dead_time).residuals)))
+
+    begin = float(min(_SCAN, key=cost))
+    used = solve(begin).used
+
+    def trimmed_cost(dead_time: float) -> float:
+        columns = _columns(motions, dead_time, has_drag)[used]
+        solution = np.linalg.lstsq(columns, target[used], rcond=None)[0]
+        return float(np.sum((target[used] - columns @ solution) ** 2))
+
+    low, high = max(0.0, begin - 0.04), min(LONGEST_DEAD_TIME, begin + 0.04)
+    best = minimize_scalar(trimmed_cost, bounds=(low, high), method="bounded")
+    return float(best.x), solve(float(best.x))
+
+
+def _covariance(
+    motions: Sequence[Motion], dead_time: float, found: LinearFit, has_drag: bool
+) -> Optional[Tuple[np.ndarray, int]]:
+    """Return the covariance of the linear parameters and the dead time."""
+    step = 0.005  # [s]
+    columns = _columns(motions, dead_time, has_drag)
+    later = _columns(motions, dead_time + step, has_drag) @ found.parameters
+    earlier = _columns(motions, max(0.0, dead_time - step), has_drag) @ found.parameters
+    slope = (later - earlier) / (step + min(step, dead_time))
+    jacobian = -np.column_stack([columns, slope])
+    blocks = np.concatenate([motion.blocks(BLOCK) for motion in motions])
+    used = found.used
+    return block_covariance(jacobian[used], found.residuals[used], blocks[used])
