@@ -122,9 +122,12 @@ class BagBuilder:
         other.messages = [m for m in self.messages if not m[0].endswith(suffixes)]
         return other
 
-    def write(self, path):
+    def write(self, path, compression=None):
         """Write the bag; return its path."""
-        with Writer(path) as writer:
+        writer = Writer(path)
+        if compression is not None:
+            writer.set_compression(compression)
+        with writer:
             connections = {}
             for topic, msgtype, t, raw in sorted(self.messages, key=lambda m: m[2]):
                 if topic not in connections:

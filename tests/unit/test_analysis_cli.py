@@ -127,22 +127,6 @@ def test_what_is_no_bag_is_one_line(name, content, tmp_path):
     assert not (tmp_path / "out.json").exists()
 
 
-@pytest.mark.parametrize("share", [0.01, 0.3, 0.7, 0.99])
-def test_truncated_bag_is_one_line(bag, share, tmp_path):
-    whole = bag.read_bytes()
-    cut = damaged(tmp_path / "cut.bag", whole[: int(share * len(whole))])
-    complains(run(cut), cut)
-
-
-def test_bag_without_an_index_says_so(bag, tmp_path):
-    content = bag.read_bytes()
-    at = content.index(b"index_pos=") + len(b"index_pos=")
-    unindexed = damaged(tmp_path / "active.bag", content[:at] + bytes(8) + content[at + 8 :])
-    result = run(unindexed)
-    complains(result, unindexed)
-    assert "not indexed" in result.stderr
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_bag_with_damaged_bytes_gives_no_traceback(bag, seed, tmp_path):
     content = bytearray(bag.read_bytes())
