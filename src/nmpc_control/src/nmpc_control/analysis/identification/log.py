@@ -16,6 +16,8 @@ from nmpc_control.analysis.source import is_hardware_in_the_loop
 from nmpc_control.errors import BagError
 
 SHORTEST = 3.0  # [s] of attitude and commands
+SILENCE = 0.3  # [s] without a new sample: the stream is interrupted
+_LONGEST = 4.0  # [h]
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,9 @@ def read_log(
     recording = reading.read(Path(path), namespace, progress)
     rows, remarks = recording.rows, list(recording.remarks)
     commands, attitude = _commands(rows), _attitude(rows)
+    duration = float(np.minimum(np.diff(attitude.times), SILENCE).sum())
+    if duration > 3600.0 * _LONGEST:
+        raise BagError(f"{duration / 3600.0:.1f} h of attitude, expected at most {_LONGEST:g} h")
     first = max(commands.times[0], attitude.times[0])
     last = min(commands.times[-1], attitude.times[-1])
     if last - first < SHORTEST:
@@ -62,7 +67,7 @@ def read_log(
         attitude=attitude,
         velocity=rows.get("velocity"),
         imu=rows.get("imu"),
-        battery=rows.get("battery"),
+        battery=_percent(rows.get("battery"), remarks),
         rc=rows.get("rc"),
         flight_status=rows.get("flight_status"),
         status=rows.get("status"),
@@ -80,7 +85,19 @@ def _commands(rows: Dict[str, Series]) -> Series:
             "mav_msgs/RollPitchYawrateThrust"
         )
     times = np.concatenate([series.times for series in found])
-    return Series(times, np.concatenate([series.values for series in found]))
+    values = np.concatenate([series.values for series in found])
+    usable = ~np.isinf(values).any(axis=1)  # NaN says that something else is commanded
+    if not usable.any():
+        raise BagError("no commands: none of them is finite")
+    return Series(times[usable], values[usable])
+
+
+def _percent(battery: Optional[Series], remarks: list) -> Optional[Series]:
+    """Return the state of charge in percent, which other drivers than DJI's give from 0 to 1."""
+    if battery is None or battery.values.max() > 1.0:
+        return battery
+    remarks.append("battery_state is taken as a share of 1")
+    return Series(battery.times, 100.0 * battery.values)
 
 
 def _attitude(rows: Dict[str, Series]) -> Series:

@@ -5,7 +5,7 @@ from typing import Dict, List, NamedTuple, Sequence
 
 import numpy as np
 
-from nmpc_control.analysis.identification.log import SHORTEST, Log
+from nmpc_control.analysis.identification.log import SHORTEST, SILENCE, Log
 from nmpc_control.analysis.identification.passages import Stretch
 from nmpc_control.analysis.record import MODE
 from nmpc_control.dji import RC_SWITCH_TOLERANCE, FlightStatus
@@ -26,7 +26,6 @@ KINDS: Dict[str, str] = {
 }
 RC_MODE_F = 8000.0  # raw; only there an M100 obeys its SDK
 _MODE_AXIS = 4
-_SILENCE = 0.3  # [s] without a new command, or without attitude
 _MOVING = 0.2  # [m/s] in the air where nothing else tells
 _JUMP = (1.0, 40.0)  # [m/s] and [m/s^2] between two samples: beyond what an M100 can do
 _AROUND_IMPACT = 0.3  # [s]
@@ -49,7 +48,7 @@ def labels(log: Log) -> np.ndarray:
     newest = np.searchsorted(log.commands.times, times, side="right") - 1
     age = np.where(newest >= 0, times - log.commands.times[np.maximum(newest, 0)], np.inf)
     commands = log.commands.values[np.maximum(newest, 0), 1:3]
-    kinds[(age > _SILENCE) | ~np.isfinite(commands).all(axis=1)] = "no_command"
+    kinds[(age > SILENCE) | ~np.isfinite(commands).all(axis=1)] = "no_command"
     if log.rc is not None:
         mode = log.rc.held_at(times)[:, _MODE_AXIS]
         kinds[np.abs(mode - RC_MODE_F) > RC_SWITCH_TOLERANCE] = "manual"
@@ -88,7 +87,7 @@ def _mark_ground(log: Log, times: np.ndarray, kinds: np.ndarray) -> None:
 
 def runs(times: np.ndarray, kinds: np.ndarray) -> List[slice]:
     """Return the runs of samples of one kind, ended by gaps in time too."""
-    changes = (kinds[1:] != kinds[:-1]) | (np.diff(times) > _SILENCE)
+    changes = (kinds[1:] != kinds[:-1]) | (np.diff(times) > SILENCE)
     edges = [0, *(np.flatnonzero(changes) + 1), len(times)]
     return [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:])]
 

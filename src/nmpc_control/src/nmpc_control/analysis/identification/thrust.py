@@ -6,7 +6,7 @@
 Where the battery fell far enough, the offset may move with it.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -34,6 +34,8 @@ VERTICAL = "vertical"
 _EXCITED = 1.0  # [percent] standard deviation of thrust below this tells no slope
 _MOVED = 0.3  # [m/s] rms of the vertical velocity below this tells no drag
 _FEWEST = 50  # windows
+_STILL = 0.1  # [m/s^2] and [m/s]: a window that hovers
+_LEVEL = 0.995  # [1] cosine of the tilt
 _LOOSE = 0.2  # [1]
 _LOOSE_DEAD_TIME = 0.05  # [s]
 _SCAN = np.arange(0.0, LONGEST_DEAD_TIME + 1e-9, 0.02)  # [s]
@@ -67,9 +69,7 @@ def identify_thrust(motions: List[Motion]) -> Thrust:
     """Return what vertical motion tells of thrust."""
     reason = _objection(motions)
     if reason:
-        return Thrust(
-            unidentified(FIGURES, NAMES, reason), unidentified((VERTICAL,), (VERTICAL,), reason)
-        )
+        return _without_map(unidentified(FIGURES, NAMES, reason), motions, reason)
     target = np.concatenate([m.acceleration[:, 2] for m in motions]) + GRAVITY
     climb = np.concatenate([m.mean(m.speed[:, 2]) for m in motions])
     has_drag = bool(np.sqrt(np.mean(climb**2)) > _MOVED)
@@ -90,8 +90,7 @@ def identify_thrust(motions: List[Motion]) -> Thrust:
     estimate = Estimate(values, {name: spans[name] for name in NAMES})
     if slope <= 0.0 or is_loose(slope, spans["slope"], _LOOSE):
         reason = "the data leave the slope open: thrust must rise and fall more, and for longer"
-        estimate = estimate.without(FIGURES, reason)
-        return Thrust(estimate, unidentified((VERTICAL,), (VERTICAL,), reason))
+        return _without_map(estimate.without(FIGURES, reason), motions, reason)
     if is_loose(dead_time, spans["dead_time_s"], 0.0, _LOOSE_DEAD_TIME):
         estimate = estimate.without(("dead_time_s",), "the data leave the dead time open")
     if has_drag:
@@ -100,6 +99,23 @@ def identify_thrust(motions: List[Motion]) -> Thrust:
         slow = f"vertical velocity stayed below {_MOVED:g} m/s rms"
         vertical = unidentified((VERTICAL,), (VERTICAL,), slow)
     return Thrust(estimate, vertical, Map(slope, offset, dead_time, drag), motions, found)
+
+
+def _without_map(estimate: Estimate, motions: List[Motion], reason: str) -> Thrust:
+    """Return what is left without a map: the thrust at which the aircraft hovered, if it did."""
+    hover = np.concatenate([_hovering(motion) for motion in motions] or [np.zeros(0)])
+    if len(hover) >= _FEWEST:
+        values = {**estimate.values, "hover_percent": float(hover.mean())}
+        estimate = replace(estimate, values=values)
+    return Thrust(estimate, unidentified((VERTICAL,), (VERTICAL,), reason))
+
+
+def _hovering(motion: Motion) -> np.ndarray:
+    """Return the thrust [percent] of windows in which nothing accelerated or climbed."""
+    percent = motion.mean(motion.percent(0.0))
+    is_still = np.abs(motion.acceleration[:, 2]) < _STILL
+    is_still &= np.abs(motion.mean(motion.speed[:, 2])) < _STILL
+    return percent[is_still & (motion.mean(motion.up[:, 2]) > _LEVEL)]
 
 
 def _objection(motions: Sequence[Motion]) -> str:

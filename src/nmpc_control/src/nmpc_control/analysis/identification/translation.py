@@ -7,7 +7,7 @@ resolution in time but no bias, and dead times can be told finer than the sample
 """
 
 from dataclasses import dataclass
-from typing import List, Sequence
+from typing import List, Optional, Sequence
 
 import numpy as np
 
@@ -31,6 +31,7 @@ class Motion:
     heading: np.ndarray  # (m + 1, 2) cosine and sine of yaw
     thrust: Series  # (c, 1) [percent] commanded
     number: int  # of the stretch
+    battery: Optional[Series] = None  # (n, 1) [percent]
 
     @property
     def times(self) -> np.ndarray:
@@ -57,6 +58,13 @@ class Motion:
         total = np.concatenate([zero, np.cumsum(values, axis=0)])
         return ((total[_STEPS:] - total[:-_STEPS]) / _STEPS)[::_STEP]
 
+    @property
+    def level(self) -> np.ndarray:
+        """State of charge (w,) [percent] at each window; NaN where it is not known."""
+        if self.battery is None:
+            return np.full(len(self.times), np.nan)
+        return self.battery.held_at(self.times)[:, 0]
+
     def blocks(self, length: float) -> np.ndarray:
         """Return the number (w,) of the block of a length [s] that each window is in."""
         return self.number * 10**6 + (self.times / length).astype(int)
@@ -79,7 +87,7 @@ def motions(stretches: Sequence[Stretch], start: float, end: float) -> List[Moti
         up = _body_z(0.5 * (angles[1:] + angles[:-1]))
         heading = np.stack([np.cos(angles[:, 2]), np.sin(angles[:, 2])], axis=1)
         velocity = log.velocity.at(grid)
-        found.append(Motion(grid, up, velocity, heading, given, number))
+        found.append(Motion(grid, up, velocity, heading, given, number, log.battery))
     return found
 
 
