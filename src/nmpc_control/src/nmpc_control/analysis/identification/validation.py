@@ -6,7 +6,12 @@ from typing import Any, Dict, List, Optional, Sequence
 import numpy as np
 
 from nmpc_control.analysis.identification.attitude import AXES
-from nmpc_control.analysis.identification.output_error import Fit, fit, fit_percents
+from nmpc_control.analysis.identification.output_error import (
+    Fit,
+    fit,
+    fit_percent,
+    fit_percents,
+)
 from nmpc_control.analysis.identification.passages import Passage
 
 FOLDS = 5
@@ -28,6 +33,7 @@ def cross_validate(found: Optional[Fit], passages: Sequence[Passage]) -> Dict[st
         why = "no parameters" if found is None else f"{duration:.0f} s, expected {_SHORTEST:g}"
         return {"folds": [], **dict.fromkeys(AXES), "reason": why}
     folds: List[Dict[str, Any]] = []
+    measured, simulated = [], []
     for number in range(FOLDS):
         kept, held_back = _split(passages, number)
         refit = fit(found.model, kept, start=found.parameters)
@@ -35,8 +41,10 @@ def cross_validate(found: Optional[Fit], passages: Sequence[Passage]) -> Dict[st
         percents = fit_percents(refit.model, refit.parameters, held_back)
         folds.append({"start": start, "end": float(held_back[-1].times[-1])})
         folds[-1].update(zip(AXES, percents))
-    means = {axis: _mean([fold[axis] for fold in folds]) for axis in AXES}
-    return {"folds": folds, **means}
+        measured += [passage.values for passage in held_back]
+        simulated += refit.model.simulate(refit.parameters, held_back)
+    pairs = zip(AXES, np.concatenate(measured).T, np.concatenate(simulated).T)
+    return {"folds": folds, **{axis: fit_percent(y, model) for axis, y, model in pairs}}
 
 
 def _split(passages: Sequence[Passage], number: int) -> List[List[Passage]]:
@@ -53,8 +61,3 @@ def _split(passages: Sequence[Passage], number: int) -> List[List[Passage]]:
             if chosen.any():
                 part.append(passage.only(chosen))
     return parts
-
-
-def _mean(percents: Sequence[Optional[float]]) -> Optional[float]:
-    known = [percent for percent in percents if percent is not None]
-    return float(np.mean(known)) if known else None
