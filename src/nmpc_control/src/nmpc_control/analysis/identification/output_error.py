@@ -9,11 +9,12 @@ from scipy.optimize import least_squares
 
 from nmpc_control.analysis.identification.confidence import BLOCK, block_covariance
 from nmpc_control.analysis.identification.passages import Passage
-from nmpc_control.analysis.identification.response import LONGEST_DEAD_TIME, Order
+from nmpc_control.analysis.identification.response import GRID, LONGEST_DEAD_TIME, Order
 
 LIMITS = (0.02, 1.5)  # [rad] of the tilt limit
 _DEAD_TIMES = np.arange(0.0, LONGEST_DEAD_TIME, 0.03)  # [s] where a search begins
 _LIMIT_SHARES = (0.3, 0.5, 0.7, 0.9, 1.1)  # of the largest command
+_STEP = 1e-4  # of shapes (relative) and of the limit [rad], for derivatives
 _OUTLIER = 0.03  # [rad] residuals beyond this lose weight in a robust fit
 
 
@@ -89,6 +90,50 @@ class ResponseModel:
         pairs = zip(self.simulate(p, passages), passages)
         return np.concatenate([(model - passage.values).ravel() for model, passage in pairs])
 
+    def jacobian(self, p: np.ndarray, passages: Sequence[Passage]) -> np.ndarray:
+        """Return the derivative (n * axes, parameters) of the residuals."""
+        rows, limit = self.unpack(p)
+        parts = []
+        for passage in passages:
+            inputs = passage.inputs(limit)
+            beyond = passage.inputs(limit + _STEP) if self.has_limit else inputs
+            part = np.zeros((len(passage.times), self.axes, len(p)))
+            for axis, row in enumerate(rows):
+                derivative = self._derivative(passage, row, inputs[:, axis], beyond[:, axis])
+                columns = self._columns(axis, len(p))
+                part[:, axis, columns] = derivative[:, : len(columns)]
+            parts.append(part.reshape(-1, len(p)))
+        return np.concatenate(parts)
+
+    def _columns(self, axis: int, size: int) -> List[int]:
+        """Return where an axis's parameters, and the limit, are among all."""
+        count = len(self.order.names)
+        if self.shares_dead_time:
+            own = [axis * (count - 1) + i for i in range(count - 1)]
+            own.append(self.axes * (count - 1))
+        else:
+            own = [axis * count + i for i in range(count)]
+        return [*own, size - 1] if self.has_limit else own
+
+    def _derivative(
+        self, passage: Passage, row: np.ndarray, u: np.ndarray, beyond: np.ndarray
+    ) -> np.ndarray:
+        """Return the derivative (n, k + 1) of one axis by its own parameters and the limit."""
+        gain, shape, dead_time = row[0], row[1:-1], row[-1]
+        output = passage.outputs(self.order, shape, u)
+        y = passage.sample(output, dead_time)
+        columns = [y]
+        for i in range(len(shape)):
+            other = shape.copy()
+            other[i] *= 1.0 + _STEP
+            moved = passage.sample(passage.outputs(self.order, other, u), dead_time)
+            columns.append(gain * (moved - y) / (other[i] - shape[i]))
+        ends = (passage.sample(output, dead_time + side * GRID / 2.0) for side in (1.0, -1.0))
+        columns.append(gain * np.subtract(*ends) / GRID)
+        moved = passage.sample(passage.outputs(self.order, shape, beyond), dead_time)
+        columns.append(gain * (moved - y) / _STEP)
+        return np.stack(columns, axis=1)
+
 
 class Fit(NamedTuple):
     """A fitted model."""
@@ -133,6 +178,7 @@ def fit(
     result = least_squares(
         model.residuals,
         first,
+        jac=model.jacobian,
         bounds=(low, high),
         x_scale=typical,
         args=(passages,),

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Linear responses to held commands, discretised exactly on a uniform grid."""
 
-from typing import NamedTuple, Sequence, Tuple
+import math
+from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter
+from scipy.linalg import expm
+from scipy.signal import lfilter
 
 GRID = 0.005  # [s] step of the grid that responses are computed on
 LONGEST_DEAD_TIME = 0.4  # [s]
@@ -64,11 +66,22 @@ def respond(order: Order, shape: Sequence[float], u: np.ndarray) -> np.ndarray:
         shape: omega [rad/s] and zeta, or the time constant [s].
         u: (m,) input, held in each interval of the grid.
     """
-    if order is SECOND:
-        omega, zeta = shape
-        system = ([omega**2], [1.0, 2.0 * zeta * omega, omega**2])
-    else:
-        system = ([1.0], [shape[0], 1.0])
-    numerator, denominator, _ = cont2discrete(system, GRID, method="zoh")
+    numerator, denominator = _second(*shape) if order is SECOND else _first(*shape)
     start = u[0]
-    return start + lfilter(numerator.ravel(), denominator, np.append(u, u[-1]) - start)
+    return start + lfilter(numerator, denominator, np.append(u, u[-1]) - start)
+
+
+def _first(time_constant: float) -> Tuple[List[float], List[float]]:
+    """Return numerator and denominator of the held first-order response in powers of 1/z."""
+    decay = math.exp(-GRID / time_constant)
+    return [0.0, 1.0 - decay], [1.0, -decay]
+
+
+def _second(omega: float, zeta: float) -> Tuple[List[float], List[float]]:
+    """Return the same of the second-order response, from the exponential of its state matrix."""
+    augmented = np.array(
+        [[0.0, 1.0, 0.0], [-(omega**2), -2.0 * zeta * omega, omega**2], [0.0, 0.0, 0.0]]
+    )
+    step = expm(GRID * augmented)
+    (a11, a12, b1), (a21, a22, b2) = step[:2]
+    return [0.0, b1, a12 * b2 - a22 * b1], [1.0, -a11 - a22, a11 * a22 - a12 * a21]
