@@ -23,6 +23,7 @@ LIMIT = "tilt_limit_rad"
 NO_FLIGHT = "no part in flight follows attitude commands"
 _LOOSE = 0.3  # [1] of a value: an interval that reaches further does not identify it
 _LOOSE_DEAD_TIME = 0.05  # [s]
+_BETTER = 0.1  # [percent] that a second order must fit better to be told from a first
 _AT_BOUND = 0.01  # [1] of the range
 
 
@@ -49,9 +50,12 @@ def identify_attitude(passages: List[Passage]) -> Attitude:
     has_limit = best.model.has_limit
     first = fit(ResponseModel(FIRST, 2, has_limit), passages)
     lags = fit(ResponseModel(FIRST, 2, has_limit, shares_dead_time=True), passages)
-    return Attitude(
-        _estimates(best, passages), _estimates(first, passages), limit, lags, best, passages
-    )
+    simple = _estimates(first, passages)
+    second = {
+        axis: without_shape(estimate, simple[axis])
+        for axis, estimate in _estimates(best, passages).items()
+    }
+    return Attitude(second, simple, limit, lags, best, passages)
 
 
 def _objection(passages: Sequence[Passage]) -> str:
@@ -102,6 +106,14 @@ def _estimates(found: Fit, passages: Sequence[Passage]) -> Dict[str, Estimate]:
             continue
         estimates[axis] = withdraw_loose(order, estimate)
     return estimates
+
+
+def without_shape(second: Estimate, first: Estimate) -> Estimate:
+    """Return a second-order estimate without its shape where first order fits no worse."""
+    fits = [estimate.values["fit_percent"] for estimate in (second, first)]
+    if None in fits or fits[0] > fits[1] + _BETTER:
+        return second
+    return second.without(("omega", "zeta"), "a first-order response fits as well")
 
 
 def withdraw_loose(order: Order, estimate: Estimate) -> Estimate:

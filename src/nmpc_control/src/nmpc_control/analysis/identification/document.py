@@ -22,6 +22,8 @@ UNITS = {
     "thrust.slope": "m/s^2 per percent",
     "thrust.offset": "m/s^2",
     "thrust.hover_percent": "percent",
+    "thrust.charge_percent": "percent of charge, where the offset moves with it: at this one",
+    "thrust.offset_per_charge": "m/s^2 per percent of charge",
     "thrust.r2": "1, of mean accelerations over 0.2 s",
     "drag": "1/s",
     "drag.steady_x": "m/s^2",

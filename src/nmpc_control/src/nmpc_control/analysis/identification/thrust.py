@@ -3,7 +3,7 @@
 
     mean(vz') + g = slope mean(u(t - d) c) + offset mean(c) - k mean(vz),   c = cos(roll) cos(pitch)
 
-Where the battery fell far enough, the offset may move with it.
+Where the battery fell far enough, the offset moves with its charge and is stated at the mean one.
 """
 
 from dataclasses import dataclass, field, replace
@@ -31,10 +31,12 @@ from nmpc_control.state import GRAVITY
 NAMES = ("slope", "offset", "dead_time_s")
 FIGURES = (*NAMES, "hover_percent", "r2")
 VERTICAL = "vertical"
+PER_CHARGE = "offset_per_charge"
 _EXCITED = 1.0  # [percent] standard deviation of thrust below this tells no slope
 _MOVED = 0.3  # [m/s] rms of the vertical velocity below this tells no drag
 _FEWEST = 50  # windows
 _STILL = 0.1  # [m/s^2] and [m/s]: a window that hovers
+_DISCHARGED = 10.0  # [percent] of charge from which on the offset may move with it
 _LEVEL = 0.995  # [1] cosine of the tilt
 _LOOSE = 0.2  # [1]
 _LOOSE_DEAD_TIME = 0.05  # [s]
@@ -54,6 +56,19 @@ class Map(NamedTuple):
         return self.slope * percent + self.offset
 
 
+class _Terms(NamedTuple):
+    """What is fitted beside slope and offset."""
+
+    has_drag: bool
+    charge: Optional[float]  # [percent] at which the offset is stated; None: it does not move
+
+    @property
+    def names(self) -> Tuple[str, ...]:
+        """Names of the linear parameters."""
+        drag = (VERTICAL,) if self.has_drag else ()
+        return ("slope", "offset", *drag, *(() if self.charge is None else (PER_CHARGE,)))
+
+
 @dataclass(frozen=True)
 class Thrust:
     """What is known of thrust and vertical drag."""
@@ -71,14 +86,13 @@ def identify_thrust(motions: List[Motion]) -> Thrust:
     if reason:
         return _without_map(unidentified(FIGURES, NAMES, reason), motions, reason)
     target = np.concatenate([m.acceleration[:, 2] for m in motions]) + GRAVITY
-    climb = np.concatenate([m.mean(m.speed[:, 2]) for m in motions])
-    has_drag = bool(np.sqrt(np.mean(climb**2)) > _MOVED)
-    dead_time, found = _best_dead_time(motions, target, has_drag)
+    terms = _terms(motions)
+    dead_time, found = _best_dead_time(motions, target, terms)
     parameters = np.append(found.parameters, dead_time)
-    names = ("slope", "offset", *([VERTICAL] if has_drag else []), "dead_time_s")
-    spans = intervals(names, parameters, _covariance(motions, dead_time, found, has_drag))
-    slope, offset = (float(x) for x in found.parameters[:2])
-    drag = float(found.parameters[2]) if has_drag else 0.0
+    names = (*terms.names, "dead_time_s")
+    spans = intervals(names, parameters, _covariance(motions, dead_time, found, terms))
+    by_name = {name: float(value) for name, value in zip(names, parameters)}
+    slope, offset, drag = by_name["slope"], by_name["offset"], by_name.get(VERTICAL, 0.0)
     used = found.used
     values = {
         "slope": slope,
@@ -87,13 +101,16 @@ def identify_thrust(motions: List[Motion]) -> Thrust:
         "hover_percent": (GRAVITY - offset) / slope if slope else None,
         "r2": r_squared(target[used], found.residuals[used]),
     }
-    estimate = Estimate(values, {name: spans[name] for name in NAMES})
+    if terms.charge is not None:
+        values.update(charge_percent=terms.charge, offset_per_charge=by_name[PER_CHARGE])
+    told = [name for name in names if name != VERTICAL]
+    estimate = Estimate(values, {name: spans[name] for name in told})
     if slope <= 0.0 or is_loose(slope, spans["slope"], _LOOSE):
         reason = "the data leave the slope open: thrust must rise and fall more, and for longer"
         return _without_map(estimate.without(FIGURES, reason), motions, reason)
     if is_loose(dead_time, spans["dead_time_s"], 0.0, _LOOSE_DEAD_TIME):
         estimate = estimate.without(("dead_time_s",), "the data leave the dead time open")
-    if has_drag:
+    if terms.has_drag:
         vertical = Estimate({VERTICAL: drag}, {VERTICAL: spans[VERTICAL]})
     else:
         slow = f"vertical velocity stayed below {_MOVED:g} m/s rms"
@@ -129,22 +146,36 @@ def _objection(motions: Sequence[Motion]) -> str:
     return ""
 
 
-def _columns(motions: Sequence[Motion], dead_time: float, has_drag: bool) -> np.ndarray:
+def _terms(motions: Sequence[Motion]) -> _Terms:
+    """Return which terms the flight can tell."""
+    climb = np.concatenate([motion.mean(motion.speed[:, 2]) for motion in motions])
+    level = np.concatenate([motion.level for motion in motions])
+    discharges = np.isfinite(level).all() and np.ptp(level) > _DISCHARGED
+    has_drag = bool(np.sqrt(np.mean(climb**2)) > _MOVED)
+    return _Terms(has_drag, float(level.mean()) if discharges else None)
+
+
+def _columns(motions: Sequence[Motion], dead_time: float, terms: _Terms) -> np.ndarray:
     rows = []
     for motion in motions:
         up = motion.up[:, 2]
-        parts = [motion.percent(dead_time) * up, up, -motion.speed[:, 2]]
-        rows.append(motion.mean(np.stack(parts[: 3 if has_drag else 2], axis=1)))
+        parts = [motion.percent(dead_time) * up, up]
+        if terms.has_drag:
+            parts.append(-motion.speed[:, 2])
+        row = motion.mean(np.stack(parts, axis=1))
+        if terms.charge is not None:
+            row = np.column_stack([row, motion.mean(up) * (motion.level - terms.charge)])
+        rows.append(row)
     return np.concatenate(rows)
 
 
 def _best_dead_time(
-    motions: Sequence[Motion], target: np.ndarray, has_drag: bool
+    motions: Sequence[Motion], target: np.ndarray, terms: _Terms
 ) -> Tuple[float, LinearFit]:
     """Return the dead time [s] that fits best, to a fraction of a sample, and the fit with it."""
 
     def solve(dead_time: float) -> LinearFit:
-        return trimmed_least_squares(_columns(motions, dead_time, has_drag), target)
+        return trimmed_least_squares(_columns(motions, dead_time, terms), target)
 
     def cost(dead_time: float) -> float:
         return float(np.median(np.abs(solve(dead_time).residuals)))
@@ -153,7 +184,7 @@ def _best_dead_time(
     used = solve(begin).used
 
     def trimmed_cost(dead_time: float) -> float:
-        columns = _columns(motions, dead_time, has_drag)[used]
+        columns = _columns(motions, dead_time, terms)[used]
         solution = np.linalg.lstsq(columns, target[used], rcond=None)[0]
         return float(np.sum((target[used] - columns @ solution) ** 2))
 
@@ -163,13 +194,13 @@ def _best_dead_time(
 
 
 def _covariance(
-    motions: Sequence[Motion], dead_time: float, found: LinearFit, has_drag: bool
+    motions: Sequence[Motion], dead_time: float, found: LinearFit, terms: _Terms
 ) -> Optional[Tuple[np.ndarray, int]]:
     """Return the covariance of the linear parameters and the dead time."""
     step = 0.005  # [s]
-    columns = _columns(motions, dead_time, has_drag)
-    later = _columns(motions, dead_time + step, has_drag) @ found.parameters
-    earlier = _columns(motions, max(0.0, dead_time - step), has_drag) @ found.parameters
+    columns = _columns(motions, dead_time, terms)
+    later = _columns(motions, dead_time + step, terms) @ found.parameters
+    earlier = _columns(motions, max(0.0, dead_time - step), terms) @ found.parameters
     slope = (later - earlier) / (step + min(step, dead_time))
     jacobian = -np.column_stack([columns, slope])
     blocks = np.concatenate([motion.blocks(BLOCK) for motion in motions])

@@ -10,7 +10,11 @@ from typing import List, Optional
 
 import numpy as np
 
-from nmpc_control.analysis.identification.attitude import NO_FLIGHT, withdraw_loose
+from nmpc_control.analysis.identification.attitude import (
+    NO_FLIGHT,
+    withdraw_loose,
+    without_shape,
+)
 from nmpc_control.analysis.identification.confidence import intervals
 from nmpc_control.analysis.identification.estimate import Estimate, unidentified
 from nmpc_control.analysis.identification.output_error import (
@@ -48,7 +52,8 @@ def identify_yaw_rate(passages: List[Passage]) -> YawRate:
     if reason:
         return YawRate(*(_nothing(order, reason) for order in (SECOND, FIRST)))
     first = fit(ResponseModel(FIRST, 1), passages)
-    return YawRate(_estimate(best, passages), _estimate(first, passages), best, passages)
+    simple = _estimate(first, passages)
+    return YawRate(without_shape(_estimate(best, passages), simple), simple, best, passages)
 
 
 def _objection(passages: List[Passage]) -> str:
