@@ -179,6 +179,9 @@ class Flight:
             bag.status(t, mode, plans_rejected=k // 500, deadline_misses=k // 50)
             if mode in (FLYING, HOVERING):
                 bag.setpoint(t, 0.1, -0.1, 38.0 + 0.1 * (k % 7), 0.2)
+            if k % 50 == 0:
+                battery = {"header": header(t), "percentage": round(200.0 - t)}
+                bag.add("dji_sdk/battery_state", "sensor_msgs/msg/BatteryState", t, battery)
             if k % 5 == 0:
                 reference = {"header": header(t), "pose": {"position": xyz(self.reference(t))}}
                 bag.add("nmpc/reference", "geometry_msgs/msg/PoseStamped", t, reference)

@@ -90,7 +90,7 @@ def records_of(chunk: bytes) -> Iterator[Record]:
 def messages_of(chunk: bytes) -> Iterator[Tuple[int, int, bytes]]:
     """Yield connection, time [ns] and content of the messages; the rest after damage is lost.
 
-    A recorder writes all headers alike: where conn and time stand is looked up once for each length.
+    A recorder writes all headers alike: where conn and time stand is looked up once a length.
     """
     at, end = 0, len(chunk)
     known_size, conn_at, time_at = -1, 0, 0

@@ -13,8 +13,14 @@ _BLOCK = 500_000  # point-segment pairs that are held in memory at a time
 
 
 def errors(position: Series, reference: Reference, start: float, end: float) -> Series:
-    """Return position minus the reference at the same time (n, 3) [m], from start to end [s]."""
+    """Return position minus the reference at the same time (n, 3) [m], from start to end [s].
+
+    A stamp that comes again counts once.
+    """
     flown = position.between(start, end)
+    again = np.diff(flown.times, prepend=-np.inf) <= 0.0
+    if again.any():
+        flown = Series(flown.times[~again], flown.values[~again])
     return Series(flown.times, flown.values - reference.position_at(flown.times))
 
 
