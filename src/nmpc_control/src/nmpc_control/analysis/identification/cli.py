@@ -107,12 +107,18 @@ def _identify(arguments: argparse.Namespace) -> Identification:
     logs = []
     for path in arguments.bags:
         try:
-            logs.append(read_log(path, arguments.namespace))
+            logs.append(read_log(path, arguments.namespace, name=_name(path, arguments.bags)))
         except BagError as error:
             raise BagError(f"{path}: {error}") from None
     fit = tuple(arguments.fit) if arguments.fit else ALWAYS
     held_back = tuple(arguments.validate) if arguments.validate else None
     return identify(logs, fit, held_back, _REGIMES[arguments.regime])
+
+
+def _name(path: Path, paths: Sequence[Path]) -> str:
+    """Return the bag's name, with its folder's where two bags are called the same."""
+    is_unique = sum(other.name == path.name for other in paths) == 1
+    return path.name if is_unique else f"{path.resolve().parent.name}/{path.name}"
 
 
 def _write(arguments: argparse.Namespace, found: Identification) -> None:
@@ -153,5 +159,6 @@ def _plain(value: Any) -> Any:
 
 
 def _give_up(sentence: str) -> NoReturn:
-    sys.stderr.write(f"{PROGRAM}: {sentence}\n")
+    printable = "".join(c for c in sentence if c.isprintable())
+    sys.stderr.write(f"{PROGRAM}: {printable}\n")
     sys.exit(2)

@@ -20,7 +20,7 @@ from nmpc_control.state import GRAVITY
 
 MEASURED, MODEL, LEFT, COMMAND = "tab:blue", "tab:orange", "tab:green", "tab:red"
 _STYLE = {"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "legend.fontsize": 8}
-_MOST_POINTS = 20_000  # drawn of one curve
+_MOST_POINTS = 5000  # drawn of one curve
 
 Curve = Tuple[np.ndarray, np.ndarray]
 

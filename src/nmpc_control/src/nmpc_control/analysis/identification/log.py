@@ -8,7 +8,7 @@ from typing import Dict, Optional, Tuple
 import numpy as np
 
 from nmpc_control.analysis import recording as reading
-from nmpc_control.analysis.messages import IMU_QUATERNION, SETPOINTS
+from nmpc_control.analysis.messages import IMU_QUATERNION, SETPOINTS, text
 from nmpc_control.analysis.quaternions import rpy_of
 from nmpc_control.analysis.record import Series
 from nmpc_control.analysis.recording import Progress, Recording
@@ -24,7 +24,7 @@ _LONGEST = 4.0  # [h]
 class Log:
     """One bag. One clock, which starts with the bag; attitudes ENU to FLU, yaw unwrapped."""
 
-    bag: str  # name of the file
+    bag: str  # what it is called
     source: str  # "simulation", "hil" or "flight"
     commands: Series  # (n, 4) thrust [percent], roll, pitch [rad], yaw rate [rad/s]; NaN: not given
     attitude: Series  # (n, 3) [rad] roll, pitch, yaw
@@ -38,9 +38,18 @@ class Log:
 
 
 def read_log(
-    path: Path, namespace: Optional[str] = None, progress: Optional[Progress] = None
+    path: Path,
+    namespace: Optional[str] = None,
+    progress: Optional[Progress] = None,
+    name: Optional[str] = None,
 ) -> Log:
     """Return what a bag says for identification.
+
+    Args:
+        path: The bag.
+        namespace: Vehicle to read; None for the best recorded one.
+        progress: Wraps the messages to show how far reading is.
+        name: What the bag is called; None: as its file.
 
     Raises:
         BagError: it cannot be read, or has no commands or attitudes of a few seconds together.
@@ -61,7 +70,7 @@ def read_log(
     if "mav_command" in rows and "setpoint" not in rows:
         remarks.append("mav_msgs commands: their thrust.z is taken as percent")
     return Log(
-        bag=Path(path).name,
+        bag=text(name or Path(path).name),
         source=_source(recording, remarks),
         commands=commands,
         attitude=attitude,

@@ -6,7 +6,7 @@ one regime. What is left is fitted again by itself: another regime, until nothin
 is left follows nothing.
 """
 
-from typing import List, Sequence
+from typing import List, Sequence, Tuple
 
 import numpy as np
 
@@ -34,6 +34,7 @@ _WINDOW = 1.0  # [s]
 _UNEXPLAINED = 0.5  # [1] of a window's motion: more than this is not following
 _LEAST_FIT = 50.0  # [percent] less is no regime
 _MOST_REGIMES = 3
+_CONCENTRATIONS = 3
 _LEFT = "left over"
 
 
@@ -50,7 +51,7 @@ def _classify(log: Log) -> np.ndarray:
         passages = attitude_passages(stretches(log, kinds, todo))
         if not passages or not is_excited(passages):
             break
-        found = fit(_model(passages), passages, is_robust=True)
+        found = _one_regime(passages)
         regime = LIMITED if is_limited(found) else FLIGHT
         if not _separate(log, kinds, passages, found, regime):
             break
@@ -72,6 +73,27 @@ def is_excited(passages: Sequence[Passage]) -> bool:
     return bool(np.sqrt(np.mean(commands**2)) > EXCITED)
 
 
+def _one_regime(passages: Sequence[Passage]) -> Fit:
+    """Return the fit of one regime where there may be several.
+
+    A robust fit alone lands between regimes of like length; refitting what it explains best
+    concentrates on one (as least trimmed squares do).
+    """
+    found = fit(_model(passages), passages, is_robust=True)
+    for _ in range(_CONCENTRATIONS):
+        models = found.model.simulate(found.parameters, passages)
+        ratios = [_unexplained(passage, model) for passage, model in zip(passages, models)]
+        moving = np.concatenate([ratio[np.isfinite(ratio)] for ratio in ratios])
+        if not len(moving):
+            break
+        bound = np.median(moving)
+        kept = [
+            p.only(ratio <= bound) for p, ratio in zip(passages, ratios) if (ratio <= bound).any()
+        ]
+        found = fit(found.model, kept, start=found.parameters)
+    return found
+
+
 def _model(passages: Sequence[Passage]) -> ResponseModel:
     largest = max(np.linalg.norm(passage.commands, axis=1).max() for passage in passages)
     return ResponseModel(SECOND, 2, has_limit=bool(largest > NORMAL_LIMIT))
@@ -90,7 +112,7 @@ def _separate(
     times = log.attitude.times
     for passage, is_followed in zip(passages, follows):
         # what settles before the first sample that is compared goes with it
-        lead = (times >= passage.grid[0] + LONGEST_DEAD_TIME) & (times < passage.times[0])
+        lead = (times > passage.grid[0] + LONGEST_DEAD_TIME - 1e-6) & (times < passage.times[0])
         inside = (times >= passage.times[0]) & (times <= passage.times[-1])
         kinds[lead] = regime if is_regime and is_followed[0] else _LEFT
         kinds[inside] = np.where(is_followed & is_regime, regime, _LEFT)
@@ -99,12 +121,25 @@ def _separate(
 
 def _follows(passage: Passage, model: np.ndarray) -> np.ndarray:
     """Return for each sample whether the second around it is explained by the model."""
-    count = max(1, int(round(_WINDOW * len(passage.times) / np.ptp(passage.times))))
-    error, motion = (
-        _moving_mean(np.sum(x**2, axis=1), count)
-        for x in (passage.values - model, np.maximum(np.abs(passage.values), np.abs(model)))
-    )
+    error, motion = _windows(passage, model)
     return error < np.maximum(_UNEXPLAINED**2 * motion, EXCITED**2)
+
+
+def _unexplained(passage: Passage, model: np.ndarray) -> np.ndarray:
+    """Return for each sample the share of the motion that is not explained; NaN at rest."""
+    error, motion = _windows(passage, model)
+    return np.where(motion > EXCITED**2, error / np.maximum(motion, EXCITED**2), np.nan)
+
+
+def _windows(passage: Passage, model: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return mean square error and motion [rad^2] in the second around each sample."""
+    duration = max(float(np.ptp(passage.times)), _WINDOW)
+    count = max(1, int(round(_WINDOW * len(passage.times) / duration)))
+    larger = np.maximum(np.abs(passage.values), np.abs(model))
+    error, motion = (
+        _moving_mean(np.sum(x**2, axis=1), count) for x in (passage.values - model, larger)
+    )
+    return error, motion
 
 
 def _moving_mean(x: np.ndarray, count: int) -> np.ndarray:
