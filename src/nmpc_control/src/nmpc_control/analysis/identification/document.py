@@ -29,6 +29,8 @@ UNITS = {
     "drag.steady_x": "m/s^2",
     "drag.steady_y": "m/s^2",
     "drag.speed_rms": "m/s",
+    "drag.quadratic_forward": "1/m, in place of the linear one",
+    "drag.quadratic_sideways": "1/m, in place of the linear one",
     "battery.levels": "percent",
     "battery.slope": "percent of thrust per percent of charge",
     "noise.attitude": "rad, standard deviation of roll, pitch, yaw",

@@ -3,6 +3,9 @@
 
     mean(v') - mean(T e_z) = -forward mean(v_f) h - sideways mean(v_s) n + b
 
+The same with the speed as a factor tells whether drag grows with its square, as it does where it
+is of pressure; the controller's model has the linear one.
+
 h and n are the heading and its left in the world, e_z the body's z axis; the constant b takes what
 steady wind does, which is not drag of the aircraft's own motion.
 """
@@ -23,7 +26,8 @@ from nmpc_control.analysis.identification.thrust import Thrust
 from nmpc_control.analysis.identification.translation import Motion
 
 NAMES = ("forward", "sideways")
-FIGURES = (*NAMES, "steady_x", "steady_y", "r2", "speed_rms")
+QUADRATIC = ("quadratic_forward", "quadratic_sideways")
+FIGURES = (*NAMES, "steady_x", "steady_y", "r2", "speed_rms", *QUADRATIC, "quadratic_r2")
 _MOVED = 0.5  # [m/s] rms of the speed along an axis below this tells no drag
 _LOOSE = 0.05  # [1/s] half of the interval
 
@@ -60,15 +64,21 @@ def identify_drag(thrust: Thrust) -> Drag:
     spans = intervals(names, found.parameters, covariance)
     values = {name: float(value) for name, value in zip(names, found.parameters)}
     values["r2"] = r_squared(np.concatenate(accelerations)[used], found.residuals[used])
+    squared = np.concatenate([_columns(motion, is_quadratic=True) for motion in motions])
+    other = trimmed_least_squares(squared, target)
+    values.update((name, float(value)) for name, value in zip(QUADRATIC, other.parameters))
+    everything = np.concatenate(accelerations)
+    values["quadratic_r2"] = r_squared(everything[other.used], other.residuals[other.used])
     values["speed_rms"] = float(np.linalg.norm(speed))
     estimate = Estimate(values, {name: spans[name] for name in NAMES})
     for name, moved in zip(NAMES, speed):
         interval = spans[name]
         if moved < _MOVED:
             reason = f"{name} velocity stayed below {_MOVED:g} m/s rms"
-            estimate = estimate.without((name,), reason)
+            estimate = estimate.without((name, f"quadratic_{name}"), reason)
         elif interval is None or interval[1] - interval[0] > 2.0 * _LOOSE:
-            estimate = estimate.without((name,), f"the data leave drag {name} open")
+            reason = f"the data leave drag {name} open"
+            estimate = estimate.without((name, f"quadratic_{name}"), reason)
     return Drag(estimate, motions, target, found)
 
 
@@ -79,9 +89,11 @@ def _along_heading(motion: Motion) -> np.ndarray:
     return 0.5 * (at_points[1:] + at_points[:-1])
 
 
-def _columns(motion: Motion) -> np.ndarray:
+def _columns(motion: Motion, is_quadratic: bool = False) -> np.ndarray:
     """Return what the parameters multiply (2 w, 4): first all of x, then all of y."""
     speeds, heading = _along_heading(motion), 0.5 * (motion.heading[1:] + motion.heading[:-1])
+    if is_quadratic:
+        speeds = speeds * np.linalg.norm(motion.speed, axis=1, keepdims=True)
     forward = motion.mean(-speeds[:, :1] * heading)
     left = motion.mean(-speeds[:, 1:] * heading[:, ::-1] * np.array([-1.0, 1.0]))
     count = len(forward)

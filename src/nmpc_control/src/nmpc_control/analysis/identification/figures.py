@@ -18,8 +18,9 @@ from nmpc_control.analysis.identification.segments import FLIGHT, KINDS, LIMITED
 from nmpc_control.analysis.identification.translation import Motion
 from nmpc_control.state import GRAVITY
 
-MEASURED, MODEL, LEFT, COMMAND = "tab:blue", "tab:orange", "tab:green", "tab:red"
+MEASURED, MODEL, RESIDUAL, COMMAND = "tab:blue", "tab:orange", "tab:green", "tab:red"
 _STYLE = {"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "legend.fontsize": 8}
+_LABELLED = 0.06  # [1] of the time axis: a shorter segment has no room for its name
 _MOST_POINTS = 5000  # drawn of one curve
 
 Curve = Tuple[np.ndarray, np.ndarray]
@@ -42,6 +43,7 @@ def write_figures(found: Identification, directory: Path, stem: str) -> List[Pat
 
 def segments_figure(found: Identification) -> Optional[Figure]:
     """Return which part of each bag was what."""
+    longest = max(part.end for part in found.segments)
     height = 1.5 + 0.5 * len(found.bags)
     figure = Figure(figsize=(9.0, height), layout="constrained")
     axes = figure.add_subplot()
@@ -51,7 +53,7 @@ def segments_figure(found: Identification) -> Optional[Figure]:
             spans = [(p.start, p.end - p.start) for p in parts if p.bag == bag]
             axes.broken_barh(spans, (row - 0.4, 0.8), color=_COLOURS.get(kind, "lightgrey"))
         for part in parts:
-            if part.end - part.start > 2.0:
+            if part.end - part.start > _LABELLED * longest:
                 middle = 0.5 * (part.start + part.end)
                 row = found.bags.index(part.bag)
                 axes.text(middle, row, kind, ha="center", va="center", fontsize=7)
@@ -107,7 +109,7 @@ def drag_figure(found: Identification) -> Optional[Figure]:
     parts = [_by_axis(values, drag.motions) for values in split]
     for axis, row in enumerate(rows):
         _residual_over_time(row, drag.motions, parts[0][axis], parts[1][axis])
-        row.set_ylabel(f"{'xy'[axis]}: left [m/s$^2$]")
+        row.set_ylabel(f"{'xy'[axis]}: measured less model [m/s$^2$]")
     return figure
 
 
@@ -137,7 +139,8 @@ _COLOURS = {FLIGHT: "tab:green", LIMITED: "gold", "not_following": "tab:red", "i
 
 def _responses(found: Fit, passages: Sequence[Passage], labels: Sequence[str]) -> Figure:
     figure = Figure(figsize=(9.0, 2.0 + 3.0 * len(labels)), layout="constrained")
-    rows = figure.subplots(2 * len(labels), sharex=True, height_ratios=[3, 1] * len(labels))
+    ratios = {"height_ratios": [3, 1] * len(labels)}
+    rows = figure.subplots(2 * len(labels), sharex=True, gridspec_kw=ratios)
     models = found.model.simulate(found.parameters, passages)
     for axis, label in enumerate(labels):
         above, below = rows[2 * axis], rows[2 * axis + 1]
@@ -147,12 +150,13 @@ def _responses(found: Fit, passages: Sequence[Passage], labels: Sequence[str]) -
             above.step(*_thin(*sent), where="post", color=COMMAND, lw=0.6, label="command")
             above.plot(*_thin(times, y), color=MEASURED, lw=1.0, label="measured")
             above.plot(*_thin(times, m), "--", color=MODEL, lw=1.0, label="model")
-            below.plot(*_thin(times, y - m), color=LEFT, lw=0.8)
+            below.plot(*_thin(times, y - m), color=RESIDUAL, lw=0.8)
         above.set_ylabel(label)
-        below.set_ylabel("left")
+        below.set_ylabel("residual")
     handles, names = rows[0].get_legend_handles_labels()
     unique = dict(zip(names, handles))
-    rows[0].legend(unique.values(), unique.keys(), loc="upper right", ncol=3)
+    place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "frameon": False}
+    rows[0].legend(unique.values(), unique.keys(), ncol=3, **place)
     rows[-1].set_xlabel("time [s]")
     return figure
 
@@ -161,7 +165,7 @@ def _residual_over_time(
     axes: Axes, motions: Sequence[Motion], residuals: np.ndarray, used: np.ndarray
 ) -> None:
     times = np.concatenate([motion.times for motion in motions])
-    axes.plot(*_thin(times[used], residuals[used]), ".", ms=1.5, color=LEFT)
+    axes.plot(*_thin(times[used], residuals[used]), ".", ms=1.5, color=RESIDUAL)
     axes.set(xlabel="time [s]", ylabel="measured less model [m/s$^2$]")
 
 

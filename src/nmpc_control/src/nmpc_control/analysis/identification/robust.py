@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-_TRIM = 5.0  # robust standard deviations
+_TRIM = 8.0  # robust standard deviations: contacts are far beyond, an imperfect model is not
 _FLOOR = 0.02  # [m/s^2] smaller residuals are no reason to drop others
 _ROUNDS = 10
 
@@ -19,7 +19,7 @@ class LinearFit(NamedTuple):
 
 
 def trimmed_least_squares(columns: np.ndarray, target: np.ndarray) -> LinearFit:
-    """Return the solution in which rows beyond five robust standard deviations do not count."""
+    """Return the solution in which rows beyond eight robust standard deviations do not count."""
     used = np.ones(len(target), dtype=bool)
     for _ in range(_ROUNDS):
         parameters = np.linalg.lstsq(columns[used], target[used], rcond=None)[0]

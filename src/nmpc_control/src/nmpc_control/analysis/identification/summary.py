@@ -24,6 +24,8 @@ _UNITS = {
     "steady_x": "m/s^2",
     "steady_y": "m/s^2",
     "speed_rms": "m/s",
+    "quadratic_forward": "1/m",
+    "quadratic_sideways": "1/m",
 }
 _MOST_LEVELS = 12  # of the battery that are printed
 
@@ -63,7 +65,7 @@ def _section(title: str, estimate: Estimate) -> List[str]:
     for name, value in estimate.values.items():
         interval = estimate.confidence.get(name)
         span = "" if interval is None else f"   [{interval[0]:.4g}, {interval[1]:.4g}]"
-        lines.append(f"  {name:<16}{number(value, _UNITS.get(name, ''))}{span}")
+        lines.append(f"  {name:<20}{number(value, _UNITS.get(name, ''))}{span}")
     if estimate.reason:
         lines.append(f"  not identifiable: {estimate.reason}")
     return lines
