@@ -8,13 +8,15 @@ import sys
 from pathlib import Path
 from typing import Any, NoReturn, Optional, Sequence
 
+import numpy as np
+
 from nmpc_control.analysis.identification.document import as_document
 from nmpc_control.analysis.identification.identify import ALWAYS, Identification, identify
 from nmpc_control.analysis.identification.log import read_log
 from nmpc_control.analysis.identification.segments import FLIGHT, LIMITED
 from nmpc_control.analysis.identification.summary import as_text
 from nmpc_control.analysis.identification.vehicle_file import vehicle_yaml
-from nmpc_control.errors import BagError, ConfigError, NmpcError
+from nmpc_control.errors import BagError, NmpcError
 from nmpc_control.params import load_vehicle
 
 PROGRAM = "identify"
@@ -38,6 +40,9 @@ def main(argv: Optional[Sequence[str]] = None) -> None:
         _write(arguments, found)
     except NmpcError as error:
         _give_up(str(error))
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+        bags = ", ".join(map(str, arguments.bags))
+        _give_up(f"{bags}: its numbers cannot be evaluated: {error}")
     except OSError as error:
         _give_up(f"{error.filename or 'output'}: cannot be written: {error.strerror or error}")
 
@@ -138,7 +143,7 @@ def _write(arguments: argparse.Namespace, found: Identification) -> None:
 def _write_vehicle(arguments: argparse.Namespace, found: Identification) -> None:
     if found.attitude.best is None and found.thrust.map is None:
         reason = found.attitude.tilt_limit.reason
-        raise ConfigError(str(arguments.write), "vehicle", None, f"something identified ({reason})")
+        raise BagError(f"{arguments.write}: not written, as nothing was identified: {reason}")
     base = load_vehicle(arguments.vehicle)
     text, kept = vehicle_yaml(found, arguments.write.stem, base, arguments.airframe)
     arguments.write.write_text(text, encoding="utf-8")

@@ -18,6 +18,14 @@ from nmpc_control.errors import BagError
 SHORTEST = 3.0  # [s] of attitude and commands
 SILENCE = 0.3  # [s] without a new sample: the stream is interrupted
 _LONGEST = 4.0  # [h]
+_PLAUSIBLE = {  # most that a column may be, in its unit: beyond is damage, not flight
+    "mav_command": (200.0, 4.0, 4.0, 50.0),
+    **dict.fromkeys(SETPOINTS, (200.0, 4.0, 4.0, 50.0)),
+    "velocity": (100.0,) * 3,
+    "attitude": (2.0,) * 4,
+    "imu": (*(2.0,) * 4, *(100.0,) * 3, *(500.0,) * 3),
+    "battery": (110.0,),
+}
 
 
 @dataclass(frozen=True)
@@ -55,7 +63,8 @@ def read_log(
         BagError: it cannot be read, or has no commands or attitudes of a few seconds together.
     """
     recording = reading.read(Path(path), namespace, progress)
-    rows, remarks = recording.rows, list(recording.remarks)
+    remarks = list(recording.remarks)
+    rows = _plausible(recording.rows, remarks)
     commands, attitude = _commands(rows), _attitude(rows)
     duration = float(np.minimum(np.diff(attitude.times), SILENCE).sum())
     if duration > 3600.0 * _LONGEST:
@@ -84,6 +93,19 @@ def read_log(
     )
 
 
+def _plausible(rows: Dict[str, Series], remarks: list) -> Dict[str, Series]:
+    """Return the rows without samples that no aircraft can have; NaN says that nothing is said."""
+    kept = {}
+    for role, series in rows.items():
+        bounds = np.array(_PLAUSIBLE.get(role, (np.inf,) * series.values.shape[1]))
+        wild = (np.abs(series.values) > bounds).any(axis=1)
+        if wild.any():
+            remarks.append(f"{role}: {wild.sum()} samples are not plausible: left out")
+        if not wild.all():
+            kept[role] = Series(series.times[~wild], series.values[~wild])
+    return kept
+
+
 def _commands(rows: Dict[str, Series]) -> Series:
     """Return the stream of commands, the newest of any topic in effect."""
     roles = ("mav_command",) if "mav_command" in rows else SETPOINTS
@@ -94,11 +116,7 @@ def _commands(rows: Dict[str, Series]) -> Series:
             "mav_msgs/RollPitchYawrateThrust"
         )
     times = np.concatenate([series.times for series in found])
-    values = np.concatenate([series.values for series in found])
-    usable = ~np.isinf(values).any(axis=1)  # NaN says that something else is commanded
-    if not usable.any():
-        raise BagError("no commands: none of them is finite")
-    return Series(times[usable], values[usable])
+    return Series(times, np.concatenate([series.values for series in found]))
 
 
 def _percent(battery: Optional[Series], remarks: list) -> Optional[Series]:
