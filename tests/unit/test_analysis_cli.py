@@ -80,31 +80,6 @@ def test_prints_tables_and_writes_json_and_csv(bag, tmp_path):
     assert float(row["average_deviation_m"]) == metrics["average_deviation_m"]
 
 
-def test_report_is_self_contained_and_has_its_figures(bag, tmp_path):
-    result = run(bag, "--quiet", "--report", tmp_path / "new" / "report")
-    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
-    names = {path.name for path in (tmp_path / "new" / "report").iterdir()}
-    figures = {"path", "inputs", "errors", "deviation"}
-    assert names == {"line.html"} | {f"line_{f}.{e}" for f in figures for e in ("png", "pdf")}
-    page = (tmp_path / "new" / "report" / "line.html").read_text()
-    assert page.count("data:image/png;base64,") == len(figures)
-    assert "http" not in page.split("<body>")[1]
-    assert "0.250" in page
-
-
-def test_text_of_the_bag_is_escaped_and_cannot_steer_the_terminal(tmp_path):
-    flight = Flight()
-    flight.spheres = (("<img src=x onerror=alert(1)>\x1b[31m", (5.0, 2.0, 2.0), 0.5),)
-    bag = flight.build(name="<script>$x^{$\x1b]0;t\x07").write(tmp_path / "evil.bag")
-    result = run(bag, "--report", tmp_path)
-    assert (result.returncode, result.stderr) == (0, "")
-    assert "\x1b" not in result.stdout
-    page = (tmp_path / "evil.html").read_text()
-    assert "<script" not in page
-    assert "<img src=x" not in page
-    assert "&lt;script&gt;" in page
-
-
 def damaged(path, content):
     path.write_bytes(content)
     return path

@@ -9,7 +9,6 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from nmpc_control.analysis.deviation import errors, path_deviation
-from nmpc_control.analysis.inputs import InputLimits
 from nmpc_control.analysis.palette import (
     AXES,
     COMMAND,
@@ -28,6 +27,8 @@ from nmpc_control.ladder import Rung
 from nmpc_control.state import PITCH_REF, ROLL_REF, THRUST, YAW_RATE_REF
 
 _ROW_HEIGHT = 150  # [pixels]
+_RUNG_STEP = 0.25  # [s]
+_MOST_BARS = 2000
 
 
 class Curve(NamedTuple):
@@ -135,15 +136,21 @@ def solver_rows(record: FlightRecord) -> Rows:
         rows["solve time [ms]"] = [Curve("solve time", milliseconds, COMMAND)]
         rows["iterations"] = [Curve("iterations", column(record.solver, 0), FLOWN, "hv")]
     if record.status is not None and record.status.values.shape[1] > RUNG:
-        rows["rung"] = [Curve("rung", column(record.status, RUNG), MANUAL, "hv")]
+        rows["rung"] = [Curve("lowest rung", _lowest_rung(record.status), MANUAL, "hv")]
     if record.battery is not None:
         rows["battery [%]"] = [Curve("battery", column(record.battery, 0), REFERENCE)]
     return rows
 
 
-def time_figure(
-    rows: Rows, record: FlightRecord, window: Window, limits: Optional[InputLimits] = None
-) -> Optional[go.Figure]:
+def _lowest_rung(status: Series) -> Series:
+    """Return the lowest rung of every quarter of a second: new plans come between old ones."""
+    part = np.floor((status.times - status.times[0]) / _RUNG_STEP).astype(int)
+    first = np.flatnonzero(np.diff(part, prepend=-1))
+    lowest = np.maximum.reduceat(status.values[:, RUNG], first)
+    return Series(status.times[first], lowest)
+
+
+def time_figure(rows: Rows, record: FlightRecord, window: Window) -> Optional[go.Figure]:
     """Return the rows above each other over the time since the bag's start [s]."""
     rows = {label: [_inside(curve, window) for curve in curves] for label, curves in rows.items()}
     rows = {label: [c for c in curves if len(c.series)] for label, curves in rows.items()}
@@ -159,6 +166,7 @@ def time_figure(
                 go.Scatter(
                     x=np.round(thin.times, 3),
                     y=thin.values.astype(np.float32),
+                    mode="lines",
                     name=curve.name,
                     legendgroup=curve.name,
                     showlegend=curve.name not in named,
@@ -229,7 +237,6 @@ def timeline_figure(record: FlightRecord) -> Optional[go.Figure]:
     return _styled(figure, 260)
 
 
-_MOST_BARS = 2000
 _BARS = {**MODES, "automatic": "#1c6dd0", "by hand": MANUAL, "held": "#5f3dc4"}
 
 
@@ -258,16 +265,24 @@ def histogram_figure(record: FlightRecord, window: Window) -> Optional[go.Figure
         )
     )
     for name, value, position in (
-        ("median", np.percentile(times, 50), "top left"),
-        ("p99", np.percentile(times, 99), "top right"),
+        ("median", np.percentile(times, 50), "bottom"),
+        ("p99", np.percentile(times, 99), "top"),
     ):
         figure.add_vline(
             value,
             line={"color": COMMAND, "dash": "dash"},
-            annotation={"text": f"{name} {value:.2f} ms"},
-            annotation_position=position,
         )
-    figure.update_xaxes(type="log", title_text="solve time [ms]")
+        figure.add_annotation(  # on a logarithmic axis its place is an exponent
+            x=np.log10(value),
+            y=1.0,
+            yref="paper",
+            text=f"{name} {value:.2f} ms",
+            showarrow=False,
+            xanchor="left",
+            yanchor=position,
+        )
+    reach = [np.log10(edges[0]) - 0.05, np.log10(edges[-1]) + 0.05]
+    figure.update_xaxes(type="log", range=reach, title_text="solve time [ms]")
     figure.update_yaxes(title_text="number of solves")
     return _styled(figure, 320)
 

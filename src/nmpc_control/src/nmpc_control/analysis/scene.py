@@ -15,6 +15,7 @@ from nmpc_control.analysis.windows import Window
 
 SAFETY_DISTANCE = 0.5  # [m] from the hull: the shell that is drawn around an obstacle
 _MOST_OBSTACLES = 40  # drawn with their names
+_FINE = (49, 25)  # points around and up a surface
 _MOST_PATH = 3000  # points of a path
 
 
@@ -33,7 +34,7 @@ def scene_figure(
         _line(figure, part, "flown by hand", MANUAL, 5, is_first=number == 0)
     if record.true_position is not None:
         truth = record.true_position.between(window.start, window.end)
-        _line(figure, truth, "flown (truth)", TRUTH, 3)
+        _line(figure, truth, "flown (truth)", TRUTH, 2)
     for number, track in enumerate((record.obstacles or ())[:_MOST_OBSTACLES]):
         _obstacle(figure, track, flown, vehicle_radius, is_first=number == 0)
     if len(flown):
@@ -46,7 +47,10 @@ def scene_figure(
             "xaxis": {"title": "x [m]", **axis},
             "yaxis": {"title": "y [m]", **axis},
             "zaxis": {"title": "z [m]", **axis},
-            "camera": {"eye": {"x": 1.1, "y": -1.5, "z": 0.9}},
+            "camera": {
+                "eye": {"x": 1.2, "y": -1.7, "z": 0.9},
+                "center": {"x": 0, "y": 0, "z": -0.15},
+            },
         },
         height=620,
         margin={"l": 0, "r": 0, "t": 10, "b": 0},
@@ -101,7 +105,7 @@ def _obstacle(
     figure: go.Figure, track: ObstacleTrack, flown: Series, vehicle_radius: float, is_first: bool
 ) -> None:
     """Draw an obstacle where it was when the aircraft came nearest, with its safety shell."""
-    name = escape(track.obstacle.id or "unnamed")
+    name = escape(track.obstacle.id or "unnamed", quote=False)
     there = flown.between(track.begin, track.end)
     times = there.times if len(there) else flown.times[:1]
     if not len(times):
@@ -127,7 +131,7 @@ def _surface(
     opacity: float,
     has_legend: bool,
 ) -> None:
-    x, y, z = surface(track.obstacle, centre, margin).astype(np.float32)
+    x, y, z = surface(track.obstacle, centre, margin, _FINE).astype(np.float32)
     figure.add_trace(
         go.Surface(
             x=x,
@@ -140,7 +144,7 @@ def _surface(
             opacity=opacity,
             surfacecolor=np.zeros_like(x),
             colorscale=[[0.0, colour], [1.0, colour]],
-            lighting={"ambient": 0.65, "diffuse": 0.6, "specular": 0.1},
+            lighting={"ambient": 0.75, "diffuse": 0.45, "specular": 0.05},
             hovertemplate=f"{name}<extra></extra>",
         )
     )

@@ -256,7 +256,11 @@ def _part(key: str, *parts: str, digits: int = 3) -> Cell:
 
 
 def _both(*keys: str) -> Cell:
-    return lambda flight: ", ".join(_format(flight[key], 2) for key in keys)
+    return lambda flight: (
+        UNKNOWN
+        if all(flight[key] is None for key in keys)
+        else ", ".join(_format(flight[key], 2) for key in keys)
+    )
 
 
 def _ends(key: str) -> Cell:
