@@ -16,6 +16,7 @@ from nmpc_control.analysis.identification.log import read_log
 from nmpc_control.analysis.identification.segments import FLIGHT, LIMITED
 from nmpc_control.analysis.identification.summary import as_text
 from nmpc_control.analysis.identification.vehicle_file import vehicle_yaml
+from nmpc_control.analysis.progress import progress_of
 from nmpc_control.errors import BagError, NmpcError
 from nmpc_control.params import load_vehicle
 
@@ -112,7 +113,8 @@ def _identify(arguments: argparse.Namespace) -> Identification:
     logs = []
     for path in arguments.bags:
         try:
-            logs.append(read_log(path, arguments.namespace, name=_name(path, arguments.bags)))
+            name = _name(path, arguments.bags)
+            logs.append(read_log(path, arguments.namespace, progress_of(path), name))
         except BagError as error:
             raise BagError(f"{path}: {error}") from None
     fit = tuple(arguments.fit) if arguments.fit else ALWAYS

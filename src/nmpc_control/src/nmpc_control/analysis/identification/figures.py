@@ -19,6 +19,7 @@ from nmpc_control.analysis.identification.translation import Motion
 from nmpc_control.state import GRAVITY
 
 MEASURED, MODEL, RESIDUAL, COMMAND = "tab:blue", "tab:orange", "tab:green", "tab:red"
+_TIME = "time [s], bags one after another"
 _STYLE = {"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "legend.fontsize": 8}
 _LABELLED = 0.06  # [1] of the time axis: a shorter segment has no room for its name
 _MOST_POINTS = 5000  # drawn of one curve
@@ -142,11 +143,12 @@ def _responses(found: Fit, passages: Sequence[Passage], labels: Sequence[str]) -
     ratios = {"height_ratios": [3, 1] * len(labels)}
     rows = figure.subplots(2 * len(labels), sharex=True, gridspec_kw=ratios)
     models = found.model.simulate(found.parameters, passages)
+    shifts = _shifts([passage.times for passage in passages])
     for axis, label in enumerate(labels):
         above, below = rows[2 * axis], rows[2 * axis + 1]
-        for passage, model in zip(passages, models):
-            times, y, m = passage.times, passage.values[:, axis], model[:, axis]
-            sent = passage.command_times, passage.commands[:, axis]
+        for passage, model, shift in zip(passages, models, shifts):
+            times, y, m = passage.times + shift, passage.values[:, axis], model[:, axis]
+            sent = passage.command_times + shift, passage.commands[:, axis]
             above.step(*_thin(*sent), where="post", color=COMMAND, lw=0.6, label="command")
             above.plot(*_thin(times, y), color=MEASURED, lw=1.0, label="measured")
             above.plot(*_thin(times, m), "--", color=MODEL, lw=1.0, label="model")
@@ -157,16 +159,28 @@ def _responses(found: Fit, passages: Sequence[Passage], labels: Sequence[str]) -
     unique = dict(zip(names, handles))
     place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "frameon": False}
     rows[0].legend(unique.values(), unique.keys(), ncol=3, **place)
-    rows[-1].set_xlabel("time [s]")
+    rows[-1].set_xlabel(_TIME)
     return figure
+
+
+def _shifts(times: Sequence[np.ndarray]) -> List[float]:
+    """Return what [s] to add to each part's times so that bags follow one another."""
+    shifts: List[float] = []
+    shift = 0.0
+    for number, part in enumerate(times):
+        if number and part[0] < times[number - 1][0]:  # another bag, whose clock starts anew
+            shift += times[number - 1][-1]
+        shifts.append(shift)
+    return shifts
 
 
 def _residual_over_time(
     axes: Axes, motions: Sequence[Motion], residuals: np.ndarray, used: np.ndarray
 ) -> None:
-    times = np.concatenate([motion.times for motion in motions])
+    parts = [motion.times for motion in motions]
+    times = np.concatenate([part + shift for part, shift in zip(parts, _shifts(parts))])
     axes.plot(*_thin(times[used], residuals[used]), ".", ms=1.5, color=RESIDUAL)
-    axes.set(xlabel="time [s]", ylabel="measured less model [m/s$^2$]")
+    axes.set(xlabel=_TIME, ylabel="measured less model [m/s$^2$]")
 
 
 def _by_axis(values: np.ndarray, motions: Sequence[Motion]) -> List[np.ndarray]:

@@ -107,6 +107,8 @@ def _passages(
         grid = origin + GRID * np.arange(int(np.ceil((last - origin) / GRID)) + 1)
         sent, commands = log.commands.times, log.commands.values[:, command]
         is_given = np.isfinite(commands).all(axis=1)
+        if not is_given[(sent >= begin) & (sent <= last)].all():
+            continue  # part of it commands something else: an angle of yaw, say
         sent, commands = sent[is_given], commands[is_given]
         near = slice(max(0, np.searchsorted(sent, grid[0]) - 1), np.searchsorted(sent, last) + 1)
         sent, commands = sent[near], commands[near]

@@ -11,9 +11,11 @@ from typing import List, Optional, Sequence
 
 import numpy as np
 
+from nmpc_control.analysis.identification.log import SILENCE
 from nmpc_control.analysis.identification.passages import Stretch
 from nmpc_control.analysis.identification.response import LONGEST_DEAD_TIME, held_mean
 from nmpc_control.analysis.record import Series
+from nmpc_control.analysis.windows import runs
 
 WINDOW = 0.2  # [s]
 _GRID = 0.01  # [s]
@@ -72,16 +74,15 @@ class Motion:
 
 def motions(stretches: Sequence[Stretch], start: float, end: float) -> List[Motion]:
     """Return the motion of stretches between two times [s], where thrust was commanded."""
+    parts = [part for stretch in stretches for part in _known(stretch)]
     found = []
-    for number, (log, begin, finish) in enumerate(stretches):
+    for number, (log, begin, finish) in enumerate(parts):
         first, last = max(begin, start) + LONGEST_DEAD_TIME, min(finish, end)
-        thrust = Series(log.commands.times, log.commands.values[:, :1])
-        given = thrust.between(begin - LONGEST_DEAD_TIME, last)
-        is_given = len(given) and np.isfinite(given.values).all()
-        if log.velocity is None or not is_given or last - first < 2.0 * WINDOW:
+        if last - first < 2.0 * WINDOW:
             continue
-        if given.times[0] > begin:  # held from before it is known, as for attitude
-            given.times[0] = begin - LONGEST_DEAD_TIME
+        thrust = Series(log.commands.times, log.commands.values[:, :1])
+        given = thrust.between(begin, last)
+        given.times[0] = begin  # the newest command before holds, and is of the same run
         grid = first + _GRID * np.arange(int((last - first) / _GRID) + 1)
         angles = log.attitude.at(grid)
         up = _body_z(0.5 * (angles[1:] + angles[:-1]))
@@ -89,6 +90,21 @@ def motions(stretches: Sequence[Stretch], start: float, end: float) -> List[Moti
         velocity = log.velocity.at(grid)
         found.append(Motion(grid, up, velocity, heading, given, number, log.battery))
     return found
+
+
+def _known(stretch: Stretch) -> List[Stretch]:
+    """Return the parts of a stretch with thrust commands and without gaps in the velocity."""
+    log, begin, finish = stretch
+    if log.velocity is None:
+        return []
+    sent = log.commands.times
+    times = sent[(sent >= begin) & (sent <= finish)]
+    thrust = log.commands.held_at(times)[:, 0]
+    after = np.clip(np.searchsorted(log.velocity.times, times), 1, len(log.velocity) - 1)
+    gap = log.velocity.times[after] - log.velocity.times[after - 1]
+    inside = (times >= log.velocity.times[0]) & (times <= log.velocity.times[-1])
+    is_known = np.isfinite(thrust) & (gap < SILENCE) & inside
+    return [Stretch(log, *period) for period in runs(times, is_known)]
 
 
 def _body_z(rpy: np.ndarray) -> np.ndarray:
