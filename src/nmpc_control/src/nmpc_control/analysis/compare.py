@@ -53,7 +53,7 @@ def compare(baseline: Sequence[FlightRecord], others: Sequence[FlightRecord]) ->
 def _compare(figure: str, unit: str, baseline: List, others: List) -> Comparison:
     random = np.random.default_rng(_SEED)
     before, after = _mean(baseline), _mean(others)
-    draws = [_drawn_mean(others, random) - _drawn_mean(baseline, random) for _ in range(DRAWS)]
+    draws = _drawn_means(others, random) - _drawn_means(baseline, random)
     tail = 50.0 * (1.0 - CONFIDENCE)
     low, high = np.percentile(draws, (tail, 100.0 - tail))
     return Comparison(figure, unit, before, after, after - before, float(low), float(high))
@@ -82,14 +82,16 @@ def _mean(flights: List) -> float:
     return float(np.mean([mean for _, _, mean in flights]))
 
 
-def _drawn_mean(flights: List, random: np.random.Generator) -> float:
-    means = []
-    for index in random.integers(len(flights), size=len(flights)):
-        sums, counts, _ = flights[index]
-        needed = int(np.ceil((len(sums) + counts[-1]) / counts.mean()))
-        drawn = random.integers(len(sums), size=max(1, needed))
-        means.append(sums[drawn].sum() / counts[drawn].sum())
-    return float(np.mean(means))
+def _drawn_means(flights: List, random: np.random.Generator) -> np.ndarray:
+    """Return the mean of every draw (DRAWS,): of flights, and of blocks within each of them."""
+    chosen = random.integers(len(flights), size=(DRAWS, len(flights)))
+    means = np.empty(chosen.shape)
+    for index, (sums, counts, _) in enumerate(flights):
+        slots = chosen == index
+        needed = max(1, int(np.ceil((len(sums) + counts[-1]) / counts.mean())))
+        drawn = random.integers(len(sums), size=(np.count_nonzero(slots), needed))
+        means[slots] = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
+    return means.mean(axis=1)
 
 
 def _deviation(record: FlightRecord, window: Window) -> Optional[Series]:
