@@ -32,6 +32,7 @@ from nmpc_control.errors import BagError
 
 Period = Tuple[float, float]  # [s] on the bag's clock
 ALWAYS: Period = (-np.inf, np.inf)
+_NO_DEAD_TIME = 1e-3  # [s]
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ def identify(
         cross_validation=cross_validate(attitude.best, passages),
         validation=held_back,
         other_regime=_other_regime(limited),
-        remarks=_remarks(logs, parts, limited),
+        remarks=(*_remarks(logs, parts, limited), *_clocks(attitude)),
     )
 
 
@@ -127,3 +128,12 @@ def _remarks(
     if not parts and limited:
         remarks.append("nothing else was flown: --regime limited identifies that regime")
     return tuple(remarks)
+
+
+def _clocks(attitude: Attitude) -> Tuple[str, ...]:
+    """Return a warning where the response follows its command without any dead time."""
+    for axis in AXES:
+        dead_time = attitude.first[axis].values["dead_time_s"]
+        if dead_time is not None and dead_time < _NO_DEAD_TIME:
+            return (f"{axis}: no dead time: no link in between, or two clocks that differ",)
+    return ()
