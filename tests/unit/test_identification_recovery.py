@@ -9,6 +9,7 @@ from identification_flights import excite, fly
 
 from nmpc_control.analysis.identification.battery import identify_battery
 from nmpc_control.analysis.identification.cli import main
+from nmpc_control.analysis.identification.drag import identify_drag
 from nmpc_control.analysis.identification.identify import identify
 from nmpc_control.analysis.identification.passages import Stretch
 from nmpc_control.analysis.identification.thrust import identify_thrust
@@ -154,3 +155,13 @@ def test_hover_alone_gives_hover_thrust_and_no_map():
     assert thrust.estimate.values["slope"] is None
     assert "no excitation" in thrust.estimate.reason
     close(thrust.estimate.values["hover_percent"], preset.hover_percent, 0.001)
+
+
+def test_velocity_that_comes_late_does_not_bias_the_drag(hil):
+    log, preset = hil.log(), load_preset("dji_hil")
+    late = Series(log.velocity.times + 0.13, log.velocity.values)
+    thrust = identify_thrust(motions([Stretch(hil.log(velocity=late), 0.2, 24.0)], -np.inf, np.inf))
+    drag = identify_drag(thrust).estimate.values
+    assert drag["velocity_lag_s"] == pytest.approx(0.13, abs=0.005)
+    close(drag["forward"], preset.drag.x)
+    close(drag["sideways"], preset.drag.y)

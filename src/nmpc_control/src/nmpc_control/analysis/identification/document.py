@@ -26,6 +26,7 @@ UNITS = {
     "thrust.offset_per_charge": "m/s^2 per percent of charge",
     "thrust.r2": "1, of mean accelerations over 0.2 s",
     "drag": "1/s",
+    "drag.velocity_lag_s": "s, that velocity is later than attitude",
     "drag.steady_x": "m/s^2",
     "drag.steady_y": "m/s^2",
     "drag.speed_rms": "m/s",

@@ -21,6 +21,7 @@ _UNITS = {
     "forward": "1/s",
     "sideways": "1/s",
     VERTICAL: "1/s",
+    "velocity_lag_s": "s",
     "steady_x": "m/s^2",
     "steady_y": "m/s^2",
     "speed_rms": "m/s",

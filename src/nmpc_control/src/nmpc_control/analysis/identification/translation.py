@@ -7,6 +7,7 @@ resolution in time but no bias, and dead times can be told finer than the sample
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import List, Optional, Sequence
 
 import numpy as np
@@ -28,12 +29,22 @@ class Motion:
     """Motion of one stretch on a grid, and the windows over it."""
 
     grid: np.ndarray  # (m + 1,) [s]
-    up: np.ndarray  # (m, 3) body z axis in the world, mean in each interval
+    attitude: Series  # (k, 3) [rad] roll, pitch, yaw of the log
     velocity: np.ndarray  # (m + 1, 3) [m/s] world
     heading: np.ndarray  # (m + 1, 2) cosine and sine of yaw
     thrust: Series  # (c, 1) [percent] commanded
     number: int  # of the stretch
     battery: Optional[Series] = None  # (n, 1) [percent]
+
+    @cached_property
+    def up(self) -> np.ndarray:
+        """Body z axis (m, 3) in the world, mean in each interval of the grid."""
+        return self.up_late(0.0)
+
+    def up_late(self, lag: float) -> np.ndarray:
+        """Return the same as it was a lag [s] before."""
+        angles = self.attitude.at(self.grid - lag)
+        return _body_z(0.5 * (angles[1:] + angles[:-1]))
 
     @property
     def times(self) -> np.ndarray:
@@ -84,11 +95,11 @@ def motions(stretches: Sequence[Stretch], start: float, end: float) -> List[Moti
         given = thrust.between(begin, last)
         given.times[0] = begin  # the newest command before holds, and is of the same run
         grid = first + _GRID * np.arange(int((last - first) / _GRID) + 1)
-        angles = log.attitude.at(grid)
-        up = _body_z(0.5 * (angles[1:] + angles[:-1]))
-        heading = np.stack([np.cos(angles[:, 2]), np.sin(angles[:, 2])], axis=1)
+        yaw = log.attitude.at(grid)[:, 2]
+        heading = np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
         velocity = log.velocity.at(grid)
-        found.append(Motion(grid, up, velocity, heading, given, number, log.battery))
+        attitude = log.attitude
+        found.append(Motion(grid, attitude, velocity, heading, given, number, log.battery))
     return found
 
 
