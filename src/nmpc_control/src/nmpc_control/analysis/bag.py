@@ -102,7 +102,7 @@ def _record(bag: str, recording: Recording, number: int) -> FlightRecord:
         stamps=stamps(recording),
         goals=goals(recording),
         log=tuple((e.time, *e.content) for e in recording.events.get("log", ())),
-        parameters=next((e.content for e in recording.events.get("parameters", ())), None),
+        parameters=([e.content for e in recording.events.get("parameters", ())] or [None])[-1],
         start_time=recording.start_time,
         missing=tuple(missing),
         **motion,

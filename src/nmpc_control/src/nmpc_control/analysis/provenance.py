@@ -11,13 +11,12 @@ _MOST_LEVELS = 8  # folders above this file that may hold .git
 
 def analysed_by() -> Dict[str, str]:
     """Return what is known of the software that evaluates, by name."""
-    commit = _commit(Path(__file__).resolve())
-    return {"Evaluated by commit": commit or "not known (installed without its repository)"}
+    return {"Evaluated by commit": commit() or "not known (installed without its repository)"}
 
 
-def _commit(path: Path) -> str:
-    """Return the commit that is checked out around a file, empty if there is none."""
-    for folder in list(path.parents)[:_MOST_LEVELS]:
+def commit() -> str:
+    """Return the commit that is checked out around this file, empty if there is none."""
+    for folder in list(Path(__file__).resolve().parents)[:_MOST_LEVELS]:
         try:
             return _head(folder / ".git")
         except (OSError, ValueError):
