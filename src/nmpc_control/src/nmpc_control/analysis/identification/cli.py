@@ -5,10 +5,12 @@ import argparse
 import json
 import math
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, NoReturn, Optional, Sequence
 
 import numpy as np
+from rich.console import Console
 
 from nmpc_control.analysis.identification.document import as_document
 from nmpc_control.analysis.identification.identify import ALWAYS, Identification, identify
@@ -119,7 +121,9 @@ def _identify(arguments: argparse.Namespace) -> Identification:
             raise BagError(f"{path}: {error}") from None
     fit = tuple(arguments.fit) if arguments.fit else ALWAYS
     held_back = tuple(arguments.validate) if arguments.validate else None
-    return identify(logs, fit, held_back, _REGIMES[arguments.regime])
+    is_shown = sys.stderr.isatty()
+    with Console(stderr=True).status("identifying") if is_shown else nullcontext():
+        return identify(logs, fit, held_back, _REGIMES[arguments.regime])
 
 
 def _name(path: Path, paths: Sequence[Path]) -> str:
