@@ -6,7 +6,12 @@ from setuptools import setup
 
 setup(
     **generate_distutils_setup(
-        packages=["nmpc_control", "nmpc_control.analysis", "nmpc_control.ros"],
+        packages=[
+            "nmpc_control",
+            "nmpc_control.analysis",
+            "nmpc_control.analysis.identification",
+            "nmpc_control.ros",
+        ],
         package_dir={"": "src"},
     )
 )

@@ -15,6 +15,7 @@ float64 pitch
 float64 yaw_rate
 geometry_msgs/Vector3 thrust
 """
+TF = "tf2_msgs/msg/TFMessage"
 TAKING_OFF, FLYING, HOVERING, LANDING, READY = 2, 3, 4, 6, 1
 
 
@@ -23,8 +24,23 @@ def workspace_types():
     types = get_types_from_msg(MAV_COMMAND, "mav_msgs/msg/RollPitchYawrateThrust")
     for path in sorted((REPOSITORY / "src/nmpc_msgs/msg").glob("*.msg")):
         types.update(get_types_from_msg(path.read_text(), f"nmpc_msgs/msg/{path.stem}"))
+    types.update(action_types(REPOSITORY / "src/nmpc_msgs/action/FlyTrajectory.action"))
+    types.update(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", TF))
     store.register(types)
     return store
+
+
+def action_types(path):
+    """Return goal and result of an action, as its generator makes messages of them."""
+    goal, result, _ = path.read_text().split("\n---\n")
+    name = f"nmpc_msgs/msg/{path.stem}"
+    types = get_types_from_msg(goal, f"{name}Goal")
+    types.update(get_types_from_msg(result, f"{name}Result"))
+    around = "Header header\nactionlib_msgs/GoalID goal_id\nnmpc_msgs/{0}Goal goal\n"
+    types.update(get_types_from_msg(around.format(path.stem), f"{name}ActionGoal"))
+    around = "Header header\nactionlib_msgs/GoalStatus status\nnmpc_msgs/{0}Result result\n"
+    types.update(get_types_from_msg(around.format(path.stem), f"{name}ActionResult"))
+    return types
 
 
 STORE = workspace_types()
@@ -68,6 +84,7 @@ class BagBuilder:
         self.prefix = prefix
         self.delay = delay  # [s] from stamp to recording
         self.messages = []
+        self.empty = []  # topics and types without messages
 
     def add(self, topic, msgtype, t, values, recorded=None):
         recorded = t + self.delay if recorded is None else recorded
@@ -122,10 +139,15 @@ class BagBuilder:
         other.messages = [m for m in self.messages if not m[0].endswith(suffixes)]
         return other
 
-    def write(self, path):
+    def write(self, path, compression=None):
         """Write the bag; return its path."""
-        with Writer(path) as writer:
+        writer = Writer(path)
+        if compression is not None:
+            writer.set_compression(compression)
+        with writer:
             connections = {}
+            for topic, msgtype in self.empty:
+                writer.add_connection(topic, msgtype, typestore=STORE)
             for topic, msgtype, t, raw in sorted(self.messages, key=lambda m: m[2]):
                 if topic not in connections:
                     connections[topic] = writer.add_connection(topic, msgtype, typestore=STORE)
@@ -176,6 +198,9 @@ class Flight:
             bag.status(t, mode, plans_rejected=k // 500, deadline_misses=k // 50)
             if mode in (FLYING, HOVERING):
                 bag.setpoint(t, 0.1, -0.1, 38.0 + 0.1 * (k % 7), 0.2)
+            if k % 50 == 0:
+                battery = {"header": header(t), "percentage": round(200.0 - t)}
+                bag.add("dji_sdk/battery_state", "sensor_msgs/msg/BatteryState", t, battery)
             if k % 5 == 0:
                 reference = {"header": header(t), "pose": {"position": xyz(self.reference(t))}}
                 bag.add("nmpc/reference", "geometry_msgs/msg/PoseStamped", t, reference)

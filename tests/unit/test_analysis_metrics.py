@@ -49,6 +49,7 @@ def record(**parts):
         obstacles=(ObstacleTrack(Obstacle("ball", np.array([5.0, 2.0, 0.1]), np.array([0.5]))),),
         commands=Series(commands, np.stack([thrust, *np.zeros((3, len(commands)))], axis=1)),
         solver=Series(plans, np.stack([number % 4, 1e-3 * (number % 7), number % 10 > 0], axis=1)),
+        battery=Series([40.0, 50.0, 90.0], [[90.0], [80.0], [40.0]]),
         status=status((42.0, 2), (44.0, 4), (46.0, 3), (72.0, 4), (80.0, 6), (85.0, 1)),
         airborne=(43.0, 84.0),
         automatic=(42.0, 85.0),
@@ -68,7 +69,10 @@ def test_deviation_to_the_reference_at_the_same_time():
     assert metrics["rmse_m"] == pytest.approx({"x": 0.0, "y": 0.18, "z": 0.24, "total": 0.3})
     assert metrics["scenario_time_s"] == pytest.approx(DURATION)
     assert metrics["reference_length_m"] == pytest.approx(10.0)
-    assert metrics["missing"] == ["the aircraft did not arrive: no navigation time"]
+    assert metrics["missing"] == [
+        "the aircraft did not arrive: no navigation time",
+        "the aircraft hardly hovered on thrust commands: no hover thrust",
+    ]
 
 
 def test_deviation_counts_only_while_the_reference_ran():
@@ -226,7 +230,15 @@ def test_motion():
 
 
 PARTS = [f.name for f in fields(FlightRecord) if f.default is None]
-OPTIONAL = {"bag", "scenario", "source", "phase_end", "reported_collisions"}  # nothing to explain
+OPTIONAL = {  # nothing to explain
+    "bag",
+    "scenario",
+    "source",
+    "phase_end",
+    "reported_collisions",
+    "rc",
+    "parameters",
+}
 
 
 @pytest.mark.parametrize("part", PARTS)
@@ -242,7 +254,15 @@ def test_without_one_part_the_rest_stands_and_json_is_strict(part):
 
 def test_empty_record_has_only_nulls():
     metrics = flight_metrics(FlightRecord())
-    given = ("schema_version", "flight", "flights", "vehicle_radius_m", "missing")
+    given = (
+        "schema_version",
+        "flight",
+        "flights",
+        "vehicle_radius_m",
+        "input_limits",
+        "missing",
+        "units",
+    )
     assert [key for key, value in metrics.items() if value is not None] == list(given)
     assert len(metrics["missing"]) >= 5
 

@@ -9,17 +9,22 @@ import numpy as np
 from nmpc_control.analysis import recording as reading
 from nmpc_control.analysis.messages import POSITION, QUATERNION, VELOCITY
 from nmpc_control.analysis.obstacle_tracks import obstacle_tracks
+from nmpc_control.analysis.other_topics import goals, other_position, published_reference, stamps
 from nmpc_control.analysis.quaternions import rpy_of, to_world
 from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Reference, Series
 from nmpc_control.analysis.recording import Event, Progress, Recording
 from nmpc_control.analysis.source import is_hardware_in_the_loop
+from nmpc_control.analysis.topics import ROLES
 from nmpc_control.analysis.windows import mode_runs, run_at, runs
 from nmpc_control.dji import FlightStatus
 from nmpc_control.errors import BagError
 from nmpc_control.mode_inputs import AUTOMATIC
 
 _IN_THE_AIR = (FlightStatus.TAKING_OFF, FlightStatus.IN_AIR, FlightStatus.LANDING)
+_PAPER = ROLES["paper_reference"].suffix
 _MOVING_SPEED = 0.2  # [m/s] in the air where nothing else tells
+
+ALL = "all"  # flights of a bag
 
 Period = Tuple[float, float]  # [s]
 
@@ -41,27 +46,49 @@ def read_flight(
     Raises:
         BagError: the bag cannot be read, holds nothing to evaluate, or not that many flights.
     """
+    return read_flights(path, flight, namespace, progress)[0]
+
+
+def read_flights(
+    path: Union[str, Path],
+    flight: Union[int, str, None] = None,
+    namespace: Optional[str] = None,
+    progress: Optional[Progress] = None,
+) -> List[FlightRecord]:
+    """Return the records of one or (``flight`` is "all") of all flights, as ``read_flight``."""
     path = Path(path)
     recording = reading.read(path, namespace, progress)
+    count = len(_clock_starts(recording.events.get("trajectory", [])))
+    if flight == ALL:
+        return [_record(path.name, recording, number) for number in range(1, max(1, count) + 1)]
+    if flight is not None and not 1 <= flight <= max(1, count):
+        raise BagError(f"has {count} flights, expected at least {flight}")
+    return [_record(path.name, recording, count if flight is None else int(flight))]
+
+
+def _record(bag: str, recording: Recording, number: int) -> FlightRecord:
     missing = list(recording.remarks)
     trajectories = recording.events.get("trajectory", [])
     starts = _clock_starts(trajectories)
-    number = len(starts) if flight is None else flight
-    if flight is not None and not 1 <= flight <= max(1, len(starts)):
-        raise BagError(f"has {len(starts)} flights, expected at least {flight}")
     start = starts[number - 1] if starts else None
-    motion = _motion(recording.rows, missing)
+    motion = _motion(recording, missing)
     status = recording.rows.get("status")
     airborne = _airborne(recording.rows, motion.get("velocity"), start, missing)
     automatic = _automatic(status, recording.rows.get("flight_status"), airborne, start, missing)
+    tracked = recording.rows.get("reference", recording.rows.get("paper_reference"))
+    reference = start and Reference(
+        start.stamp, Series(start.content.times, start.content.positions)
+    )
+    if reference is None and "paper_reference" in recording.rows:
+        reference = published_reference(recording.rows["paper_reference"], automatic)
+        missing.append(f"no nmpc/trajectory: the reference is what {_PAPER} published")
     return FlightRecord(
-        bag=path.name,
+        bag=bag,
         flight=(max(number, 1), max(len(starts), 1)),
         scenario=_name(start or (trajectories or [None])[-1]),
         source=_source(recording, missing),
-        reference=start
-        and Reference(start.stamp, Series(start.content.times, start.content.positions)),
-        tracked_reference=recording.rows.get("reference"),
+        reference=reference,
+        tracked_reference=tracked,
         obstacles=_obstacles(recording.events, start, automatic),
         commands=_commands(recording.rows, missing),
         solver=recording.rows.get("plan"),
@@ -70,6 +97,13 @@ def read_flight(
         automatic=automatic,
         phase_end=_next_trajectory(trajectories, start),
         reported_collisions=_collisions(recording, automatic),
+        rc=recording.rows.get("rc"),
+        battery=recording.rows.get("battery"),
+        stamps=stamps(recording),
+        goals=goals(recording),
+        log=tuple((e.time, *e.content) for e in recording.events.get("log", ())),
+        parameters=([e.content for e in recording.events.get("parameters", ())] or [None])[-1],
+        start_time=recording.start_time,
         missing=tuple(missing),
         **motion,
     )
@@ -92,7 +126,8 @@ def _next_trajectory(trajectories: List[Event], start: Optional[Event]) -> Optio
     return min(later, default=None)
 
 
-def _motion(rows: Dict[str, Series], missing: List[str]) -> Dict[str, Optional[Series]]:
+def _motion(recording: Recording, missing: List[str]) -> Dict[str, Optional[Series]]:
+    rows = recording.rows
     motion: Dict[str, Optional[Series]] = {"position": None, "velocity": rows.get("velocity")}
     if "odometry" in rows:
         times, values = rows["odometry"].times, rows["odometry"].values
@@ -101,11 +136,8 @@ def _motion(rows: Dict[str, Series], missing: List[str]) -> Dict[str, Optional[S
             Series(times, to_world(values[:, QUATERNION], values[:, VELOCITY]))
         )
         motion["attitude"] = _finite(Series(times, rpy_of(values[:, QUATERNION])))
-    elif "local_position" in rows:
-        motion["position"] = rows["local_position"]
-        missing.append(
-            "no nmpc/odometry: position is dji_sdk/local_position, not the controller's estimate"
-        )
+    else:
+        motion["position"] = other_position(recording, missing)
     if motion.get("attitude") is None:
         quaternions = next((rows[role] for role in ("attitude", "imu") if role in rows), None)
         if quaternions is not None:

@@ -7,7 +7,7 @@ comments or defaults.
 """
 
 import re
-from typing import Any, Callable
+from typing import Any, NamedTuple, Sequence, Tuple
 
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -23,11 +23,25 @@ _LINE = re.compile(
 _TYPE = re.compile(r"MSG:\s*([A-Za-z]\w*/[A-Za-z]\w*)\s*$", re.ASCII)
 _SEPARATOR = "=" * 80
 
-Decode = Callable[[bytes], Any]
+
+class Decoder(NamedTuple):
+    """A message type as the bag itself defines it."""
+
+    msgtype: str
+    store: Any  # of the library, with this type and those it needs
+
+    def __call__(self, raw: bytes) -> Any:
+        """Return a raw ROS 1 message as an object with the definition's fields."""
+        return self.store.deserialize_ros1(raw, self.msgtype)
+
+    def fields(self, msgtype: str) -> Sequence[Tuple[str, Any]]:
+        """Return names and descriptions of the fields of this type or of one that it needs."""
+        known = getattr(self.store, "fielddefs", None) or self.store.FIELDDEFS  # rosbags 0.9
+        return known[msgtype][1]
 
 
-def decoder(msgtype: str, definition: str) -> Decode:
-    """Return the function from a raw ROS 1 message to an object with the definition's fields.
+def decoder(msgtype: str, definition: str) -> Decoder:
+    """Return what decodes messages of a type, from the definition that the bag carries.
 
     Raises:
         BagError: the definition cannot be understood.
@@ -41,7 +55,7 @@ def decoder(msgtype: str, definition: str) -> Decode:
         raise BagError(
             f"the definition of {msgtype} cannot be used ({type(error).__name__})"
         ) from None
-    return lambda raw: store.deserialize_ros1(raw, msgtype)
+    return Decoder(msgtype, store)
 
 
 def plain_definition(definition: str) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a flight cost: solver, command stream and motion."""
+"""What a flight cost: solver and command stream."""
 
 import math
 from typing import List, Optional
@@ -22,6 +22,7 @@ from nmpc_control.state import THRUST
 
 _SOLVER_FIGURES = (
     "solver_iterations_mean",
+    "solver_iterations",
     "solve_time_ms",
     "plans_found_ratio",
     "plans_rejected",
@@ -33,25 +34,30 @@ _COMMAND_FIGURES = (
     "command_gap_ms_max",
     "command_gap_ms_p99",
 )
-_MOTION_FIGURES = ("airborne_time_s", "path_length_m", "speed_m_s", "tilt_rad")
 
 
 def solver_figures(record: FlightRecord, window: Optional[Window], missing: List[str]) -> Metrics:
     """Return iterations and solve times of the plans in the window."""
     figures: Metrics = dict.fromkeys(_SOLVER_FIGURES)
-    status = _within(record.status, window)
+    status = within(record.status, window)
     if len(status):
         counted = status[-1] - status[0]
         figures["plans_rejected"] = int(counted[PLANS_REJECTED])
         figures["deadline_misses"] = int(counted[DEADLINE_MISSES])
     else:
         missing.append("no status of the guard: no count of rejected plans and deadline misses")
-    plans = _within(record.solver, window)
+    plans = within(record.solver, window)
     if not len(plans):
         missing.append("no solver results in the evaluated time: no iterations and no solve times")
         return figures
     milliseconds = 1e3 * plans[:, SOLVE_TIME]
     figures["solver_iterations_mean"] = plans[:, ITERATIONS].mean()
+    iterations = plans[:, ITERATIONS]
+    figures["solver_iterations"] = {
+        "p50": np.percentile(iterations, 50),
+        "p99": np.percentile(iterations, 99),
+        "max": iterations.max(),
+    }
     figures["plans_found_ratio"] = plans[:, FOUND].mean()
     figures["solve_time_ms"] = {
         "mean": milliseconds.mean(),
@@ -68,7 +74,7 @@ def command_figures(record: FlightRecord, window: Optional[Window], missing: Lis
     if record.commands is None or window is None:
         missing.append("no commands: no thrust range, command rate or gaps")
         return figures
-    thrust = _within(record.commands, window)[:, THRUST]
+    thrust = within(record.commands, window)[:, THRUST]
     thrust = thrust[np.isfinite(thrust)]
     if len(thrust):
         figures["thrust_percent"] = [thrust.min(), thrust.max()]
@@ -93,40 +99,13 @@ def command_gaps(record: FlightRecord, window: Window) -> np.ndarray:
     if record.status is not None:
         first, last = record.automatic or (-math.inf, math.inf)
         streaming = mode_runs(record.status, STREAMING)
-        periods = [(start, end) for start, end in streaming if first <= start and end <= last]
+        clipped = [(max(start, first), min(end, last)) for start, end in streaming]
+        periods = [(start, end) for start, end in clipped if start < end]
     gaps = [np.diff(record.commands.between(start, end).times) for start, end in periods]
     return np.concatenate(gaps) if gaps else np.zeros(0)
 
 
-def motion_figures(record: FlightRecord, window: Optional[Window], missing: List[str]) -> Metrics:
-    """Return time in the air, length, speed and tilt in the window."""
-    figures: Metrics = dict.fromkeys(_MOTION_FIGURES)
-    if record.airborne is None:
-        missing.append("nothing says when the aircraft was in the air: no airborne time")
-    else:
-        figures["airborne_time_s"] = record.airborne[1] - record.airborne[0]
-    if window is None:
-        return figures
-    if record.position is None:
-        missing.append("no positions: no path length")
-    else:
-        steps = np.diff(_within(record.position, window), axis=0)
-        figures["path_length_m"] = np.linalg.norm(steps, axis=1).sum() if len(steps) else None
-    velocity, attitude = _within(record.velocity, window), _within(record.attitude, window)
-    if len(velocity):
-        speed = np.linalg.norm(velocity, axis=1)
-        figures["speed_m_s"] = {"mean": speed.mean(), "max": speed.max()}
-    else:
-        missing.append("no velocities: no speed")
-    if len(attitude):
-        tilt = np.arccos(np.cos(attitude[:, 0]) * np.cos(attitude[:, 1]))
-        figures["tilt_rad"] = {"mean": tilt.mean(), "max": tilt.max()}
-    else:
-        missing.append("no attitudes: no tilt")
-    return figures
-
-
-def _within(series: Optional[Series], window: Optional[Window]) -> np.ndarray:
+def within(series: Optional[Series], window: Optional[Window]) -> np.ndarray:
     """Return the values in the window; none where there is no series or no window."""
     if series is None or window is None:
         return np.zeros((0, 1))

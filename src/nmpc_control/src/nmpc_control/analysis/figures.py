@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Figures like the paper's: path in space, inputs, error of each axis, deviation over time."""
+"""Figures like the paper's as PDF: path, inputs, states, errors, deviation, solve times."""
 
 from pathlib import Path
-from typing import Callable, Dict, List, Optional, Sequence
+from typing import Callable, Dict, Iterable, List, Optional, Sequence
 
 import matplotlib
 import numpy as np
@@ -10,14 +10,25 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from nmpc_control.analysis.deviation import errors, path_deviation
-from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Series
+from nmpc_control.analysis.palette import (
+    AXES,
+    COMMAND,
+    FLOWN,
+    MANUAL,
+    OBSTACLE,
+    REFERENCE,
+    SHELL,
+    TRUTH,
+    thinned,
+)
+from nmpc_control.analysis.record import SOLVE_TIME, FlightRecord, ObstacleTrack, Series
+from nmpc_control.analysis.surfaces import surface
+from nmpc_control.analysis.timeline import periods
 from nmpc_control.analysis.windows import Window, scenario_window
-from nmpc_control.state import PITCH_REF, ROLL_REF, THRUST, YAW_RATE_REF, Obstacle
+from nmpc_control.state import PITCH_REF, ROLL_REF, THRUST, YAW_RATE_REF
 
 SAFETY_DISTANCE = 0.5  # [m] from the hull: the shell that is drawn around an obstacle
-REFERENCE, FLOWN, TRUTH, COMMAND = "tab:orange", "tab:blue", "tab:cyan", "tab:red"
 _STYLE = {"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "legend.fontsize": 8}
-_MOST_POINTS = 5000  # drawn of one curve
 
 Draw = Callable[[FlightRecord, Window, float], Optional[Figure]]
 
@@ -25,7 +36,7 @@ Draw = Callable[[FlightRecord, Window, float], Optional[Figure]]
 def write_figures(
     record: FlightRecord, directory: Path, stem: str, vehicle_radius: float
 ) -> List[Path]:
-    """Write ``<stem>_<figure>.png`` and ``.pdf`` where they can be drawn; return the PNG files."""
+    """Write ``<stem>_<figure>.pdf`` for all figures that can be drawn; return the files."""
     window = scenario_window(record)
     written: List[Path] = []
     if window is None:
@@ -35,9 +46,8 @@ def write_figures(
             figure = draw(record, window, vehicle_radius)
             if figure is None:
                 continue
-            path = directory / f"{stem}_{name}.png"
-            figure.savefig(path, dpi=130)
-            figure.savefig(path.with_suffix(".pdf"))
+            path = directory / f"{stem}_{name}.pdf"
+            figure.savefig(path)
             written.append(path)
     return written
 
@@ -59,6 +69,10 @@ def path_figure(record: FlightRecord, window: Window, vehicle_radius: float) -> 
         axes.plot(*_thin(true).T, color=TRUTH, linewidth=0.8, label="flown (truth)")
     for track in record.obstacles or ():
         _draw_obstacle(axes, track, window.start, vehicle_radius)
+    if record.obstacles:
+        axes.plot([], [], "o", color=OBSTACLE, label="obstacle")
+        shell = SAFETY_DISTANCE + vehicle_radius
+        axes.plot([], [], "o", color=SHELL, alpha=0.4, label=f"within {shell:g} m")
     points = np.concatenate([curve for curve in curves if len(curve)] or [np.zeros((1, 3))])
     _equal_axes(axes, points, record.obstacles or ())
     axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
@@ -87,6 +101,7 @@ def inputs_figure(record: FlightRecord, window: Window, vehicle_radius: float) -
             row.plot(attitude.times, attitude.values[:, angle], color=FLOWN, label="measured")
         row.set_ylabel(label)
     rows[-1].set_xlabel("time [s]")
+    _shade(rows, record, window)
     _legend(rows[ROLL_REF])
     return figure
 
@@ -103,6 +118,7 @@ def errors_figure(record: FlightRecord, window: Window, vehicle_radius: float) -
             row.plot(error.times, error.values[:, axis], color=_COLOURS[name], label=name)
         row.set_ylabel(f"{'xyz'[axis]} error [m]")
     rows[-1].set_xlabel("time [s]")
+    _shade(rows, record, window)
     _legend(rows[0])
     return figure
 
@@ -125,6 +141,52 @@ def deviation_figure(
         axes.plot(flown.times - window.start, nearest, color=REFERENCE, label="from its path")
     axes.set(xlabel="time [s]", ylabel="deviation [m]")
     axes.set_ylim(bottom=0.0)
+    _shade([axes], record, window)
+    _legend(axes)
+    return figure
+
+
+def states_figure(record: FlightRecord, window: Window, vehicle_radius: float) -> Optional[Figure]:
+    """Return position with its reference, and velocity."""
+    if record.position is None or record.velocity is None:
+        return None
+    position, velocity = _since(record.position, window), _since(record.velocity, window)
+    figure = Figure(figsize=(6.0, 6.5), layout="constrained")
+    rows = figure.subplots(4, sharex=True)
+    for axis, row in enumerate(rows[:3]):
+        if record.reference is not None:
+            path = record.reference.path
+            start = record.reference.start - window.start
+            row.plot(path.times + start, path.values[:, axis], "--", color=REFERENCE)
+        row.plot(position.times, position.values[:, axis], color=FLOWN)
+        row.set_ylabel(f"{'xyz'[axis]} [m]")
+    for axis, name in enumerate("xyz"):
+        rows[3].plot(velocity.times, velocity.values[:, axis], color=AXES[axis], label=f"v{name}")
+    rows[3].set(xlabel="time [s]", ylabel="velocity [m/s]")
+    _shade(rows, record, window)
+    rows[0].plot([], [], "--", color=REFERENCE, label="reference")
+    rows[0].plot([], [], color=FLOWN, label="estimate")
+    _legend(rows[0])
+    rows[3].legend(loc="upper right", ncol=3, frameon=False)
+    return figure
+
+
+def solver_figure(record: FlightRecord, window: Window, vehicle_radius: float) -> Optional[Figure]:
+    """Return the histogram of solve times."""
+    if record.solver is None:
+        return None
+    times = 1e3 * record.solver.between(window.start, window.end).values[:, SOLVE_TIME]
+    if not len(times):
+        return None
+    figure = Figure(figsize=(6.0, 2.6), layout="constrained")
+    axes = figure.add_subplot()
+    low = max(times.min(), 1e-3)
+    edges = np.geomspace(low, max(times.max(), 2.0 * low), 41)
+    axes.hist(np.maximum(times, low), edges, color=FLOWN, edgecolor="white", linewidth=0.3)
+    for share, style in ((50, "--"), (99, ":")):
+        value = np.percentile(times, share)
+        axes.axvline(value, color=COMMAND, linestyle=style, label=f"p{share} {value:.2f} ms")
+    axes.set(xscale="log", xlabel="solve time [ms]", ylabel="solves")
     _legend(axes)
     return figure
 
@@ -132,6 +194,8 @@ def deviation_figure(
 _FIGURES: Dict[str, Draw] = {
     "path": path_figure,
     "inputs": inputs_figure,
+    "states": states_figure,
+    "solver": solver_figure,
     "errors": errors_figure,
     "deviation": deviation_figure,
 }
@@ -161,14 +225,25 @@ def _legend(axes: Axes) -> None:
 
 
 def _thin(curve: np.ndarray) -> np.ndarray:
-    return curve[:: max(1, len(curve) // _MOST_POINTS)]
+    return thinned(Series(np.arange(len(curve)), curve)).values
+
+
+def _shade(rows: Iterable[Axes], record: FlightRecord, window: Window) -> None:
+    """Mark the parts that were flown by hand, as in the paper."""
+    for period in periods(record):
+        start, end = max(period.start, window.start), min(period.end, window.end)
+        if period.automatic is False and start < end:
+            for row in rows:
+                row.axvspan(
+                    start - window.start, end - window.start, color=MANUAL, alpha=0.15, lw=0
+                )
 
 
 def _equal_axes(axes: Axes, points: np.ndarray, tracks: Sequence[ObstacleTrack]) -> None:
     """Show one metre at the same length on all axes, with everything in view."""
     for track in tracks:
-        surface = _surface(track.obstacle, track.obstacle.position, 0.0).reshape(3, -1).T
-        points = np.concatenate([points, surface])
+        hull = surface(track.obstacle, track.obstacle.position, 0.0).reshape(3, -1).T
+        points = np.concatenate([points, hull])
     low, high = points.min(axis=0), points.max(axis=0)
     half = np.maximum(high - low, 0.3 * (high - low).max() + 0.1) / 2.0
     low, high = (low + high) / 2.0 - half, (low + high) / 2.0 + half
@@ -181,22 +256,5 @@ def _draw_obstacle(axes: Axes, track: ObstacleTrack, t: float, vehicle_radius: f
     centre = track.centre_at(np.array([t]))[0]
     shell = SAFETY_DISTANCE + vehicle_radius
     grid = {"rcount": 25, "ccount": 25, "linewidth": 0.0}
-    axes.plot_surface(*_surface(track.obstacle, centre, 0.0), color="tab:red", alpha=0.8, **grid)
-    axes.plot_surface(*_surface(track.obstacle, centre, shell), color="gold", alpha=0.15, **grid)
-
-
-def _surface(obstacle: Obstacle, centre: np.ndarray, margin: float) -> np.ndarray:
-    """Return x, y, z (3, n, m) [m] of a sphere, cylinder or box grown by a margin [m]."""
-    around, up = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), np.linspace(-1.0, 1.0, 13))
-    if obstacle.shape == "sphere":
-        level = np.sqrt(1.0 - np.sin(up * np.pi / 2.0) ** 2)
-        half = np.full(3, obstacle.size[0] + margin)
-        unit = [level * np.cos(around), level * np.sin(around), np.sin(up * np.pi / 2.0)]
-    elif obstacle.shape == "cylinder":
-        half = np.array([obstacle.size[0], obstacle.size[0], obstacle.size[1] / 2.0]) + margin
-        unit = [np.cos(around), np.sin(around), up]
-    else:
-        half = obstacle.size / 2.0 + margin
-        largest = np.maximum(np.abs(np.cos(around)), np.abs(np.sin(around)))
-        unit = [np.cos(around) / largest, np.sin(around) / largest, up]
-    return centre[:, None, None] + half[:, None, None] * np.array(unit)
+    axes.plot_surface(*surface(track.obstacle, centre, 0.0), color=OBSTACLE, alpha=0.9, **grid)
+    axes.plot_surface(*surface(track.obstacle, centre, shell), color=SHELL, alpha=0.15, **grid)

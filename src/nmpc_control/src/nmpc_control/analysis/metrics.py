@@ -7,29 +7,52 @@ obstacle's surface. A figure that cannot be computed is None, and ``missing`` sa
 """
 
 import math
-from typing import Any
+from typing import Any, Optional, Tuple
 
 import numpy as np
 
 from nmpc_control.analysis.clearance import clearance_figures
-from nmpc_control.analysis.effort import command_figures, motion_figures, solver_figures
+from nmpc_control.analysis.effort import command_figures, solver_figures
+from nmpc_control.analysis.inputs import InputLimits, default_limits, input_figures
+from nmpc_control.analysis.motion import motion_figures
 from nmpc_control.analysis.record import FlightRecord, Metrics
+from nmpc_control.analysis.segments import parts, segment_figures
+from nmpc_control.analysis.streams import battery_figures, stream_figures
+from nmpc_control.analysis.timeline import timeline_figures
 from nmpc_control.analysis.tracking import arrival_figures, reference_figures
-from nmpc_control.analysis.windows import scenario_window
+from nmpc_control.analysis.units import units
+from nmpc_control.analysis.windows import Window, scenario_window
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 VEHICLE_RADIUS = 0.5  # [m] hull of the M100: 650 mm diagonal and 13 inch propellers
 
 
-def flight_metrics(record: FlightRecord, vehicle_radius: float = VEHICLE_RADIUS) -> Metrics:
+def flight_metrics(
+    record: FlightRecord,
+    vehicle_radius: float = VEHICLE_RADIUS,
+    limits: Optional[InputLimits] = None,
+    segments: Optional[str] = None,
+    between: Optional[Tuple[float, float]] = None,
+) -> Metrics:
     """Return the figures of a flight: keys end in their unit, values are JSON types, never NaN.
 
     Args:
         record: The flight; every part may be missing.
         vehicle_radius: Hull, centre to outermost propeller tip [m]; 0 for the paper's meaning.
+        limits: Bounds of the inputs; None: the controller's for its own flights, else the paper's.
+        segments: Also figures of parts: "mode", "goal" or seconds.
+        between: First and last moment [s] since the bag's start to evaluate; None: the scenario's
+            phase.
+
+    Raises:
+        ValueError: ``segments`` is none of these.
+        ConfigError: the controller's limits cannot be read.
     """
     missing = list(record.missing)
     window = scenario_window(record)
+    if between is not None:
+        window = _narrowed(window, between)
+    limits = default_limits(record) if limits is None else limits
     metrics: Metrics = {
         "schema_version": SCHEMA_VERSION,
         "bag": record.bag,
@@ -44,18 +67,34 @@ def flight_metrics(record: FlightRecord, vehicle_radius: float = VEHICLE_RADIUS)
     metrics.update(arrival_figures(record, window, missing))
     metrics.update(solver_figures(record, window, missing))
     metrics.update(command_figures(record, window, missing))
+    metrics.update(input_figures(record, window, limits, missing))
     metrics.update(clearance_figures(record, window, vehicle_radius, missing))
     metrics.update(motion_figures(record, window, missing))
-    metrics["missing"] = missing
-    return _plain(metrics)
+    metrics.update(stream_figures(record, window, missing))
+    metrics.update(battery_figures(record, window, missing))
+    metrics.update(timeline_figures(record, missing))
+    if segments is not None:
+        found = parts(record, segments)
+        metrics["segments"] = segment_figures(record, found, vehicle_radius, limits)
+        if not found:
+            missing.append(f"no parts by {segments}: the bag does not tell them")
+    metrics["missing"] = list(dict.fromkeys(missing))
+    metrics["units"] = units(metrics)
+    return plain(metrics)
 
 
-def _plain(value: Any) -> Any:
+def _narrowed(window: Optional[Window], between: Tuple[float, float]) -> Window:
+    start, end = between
+    reference_end = end if window is None else min(end, window.reference_end)
+    return Window(start, max(start, reference_end), end)
+
+
+def plain(value: Any) -> Any:
     """Return the value as JSON types, None for what is not finite."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     if isinstance(value, (int, np.integer)):

@@ -31,3 +31,17 @@ def tilt_of(quaternions: np.ndarray) -> np.ndarray:
     """Return the angle (n,) [rad] between the body's z axis and the vertical."""
     x, y, _, _ = unit(quaternions).T
     return np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))
+
+
+def from_rpy(angles: np.ndarray) -> np.ndarray:
+    """Return the quaternions (n, 4) of roll, pitch, yaw (n, 3) [rad]."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(angles.T / 2.0), np.cos(angles.T / 2.0)
+    return np.stack(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ],
+        axis=1,
+    )

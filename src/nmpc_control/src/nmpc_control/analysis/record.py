@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What is known of one flight, as plain arrays: a bag or a simulation fills it, metrics read it."""
 
-from dataclasses import dataclass
-from typing import Any, Dict, Optional, Tuple
+from dataclasses import dataclass, field
+from typing import Any, Dict, Mapping, Optional, Tuple
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from nmpc_control.state import Obstacle
 
 # Columns of FlightRecord.solver and of FlightRecord.status; those of commands are in state.py.
 ITERATIONS, SOLVE_TIME, FOUND = 0, 1, 2
-MODE, PLANS_REJECTED, DEADLINE_MISSES = 0, 1, 2
+MODE, PLANS_REJECTED, DEADLINE_MISSES, RUNG, AUTHORITY = range(5)  # the last two may be absent
 
 Metrics = Dict[str, Any]  # figures by name; names end in their unit
 
@@ -87,8 +87,10 @@ class ObstacleTrack:
         """Return the centres (m, 3) [m] at times (m,) [s]."""
         if self.centres is not None:
             return self.centres.at(times)
-        moved = [self.obstacle.position_at(t) for t in times]
-        return np.array(moved, dtype=float).reshape(len(times), 3)
+        if self.obstacle.stamp is None:
+            return np.tile(np.asarray(self.obstacle.position, dtype=float), (len(times), 1))
+        age = np.asarray(times)[:, None] - self.obstacle.stamp
+        return self.obstacle.position + age * self.obstacle.velocity
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,16 @@ class FlightRecord:
         None  # (n, 4) thrust [percent], roll, pitch [rad], yaw rate [rad/s]; NaN: not given
     )
     solver: Optional[Series] = None  # (n, 3) iterations, solve time [s], found
-    status: Optional[Series] = None  # (n, 3) mode, plans rejected, deadline misses
+    status: Optional[Series] = (
+        None  # (n, 3 or 5) mode, plans rejected, deadline misses, rung, authority
+    )
+    rc: Optional[Series] = None  # (n, 6) sticks, mode switch, landing gear switch as dji_sdk sends
+    battery: Optional[Series] = None  # (n, 1) charge [percent]
+    stamps: Mapping[str, np.ndarray] = field(default_factory=dict)  # [s] of each topic's messages
+    goals: Tuple[Tuple[str, float, float], ...] = ()  # scenario, start, end [s] of each action goal
+    log: Tuple[Tuple[float, int, str, str], ...] = ()  # [s], level, node, text
+    parameters: Optional[str] = None  # of the controller, as it published them
+    start_time: float = 0.0  # [s] what the clock of the record counts from
     airborne: Optional[Tuple[float, float]] = None  # [s] first and last moment in the air
     automatic: Optional[Tuple[float, float]] = None  # [s] from take-off to landing, of this flight
     phase_end: Optional[float] = None  # [s] the trajectory's phase ended; None: with the data

@@ -10,7 +10,12 @@ UNKNOWN = "-"
 NOT_APPLICABLE = "N/A"
 _SAME = 0.01  # share by which length and duration of the same reference may differ
 
-_PAIRS = {"thrust_percent": ("min", "max"), "window_s": ("start", "end")}
+_PAIRS = {
+    "thrust_percent": ("min", "max"),
+    "window_s": ("start", "end"),
+    "battery_percent": ("start", "end"),
+}
+_NO_COLUMNS = ("units", "timeline", "segments", "streams")  # lists, and what is no figure
 
 Cell = Callable[[Metrics], str]
 Row = Tuple[str, List[str]]  # label, one cell per flight
@@ -42,8 +47,25 @@ def sections(flights: Sequence[Metrics]) -> List[Section]:
         "Average deviation from the path [m]": _number("average_path_deviation_m"),
         "Average deviation, truth [m]": _number("average_deviation_truth_m"),
         "Maximum deviation, truth [m]": _number("maximum_deviation_truth_m"),
-        "Speed, mean and maximum [m/s]": _mean_and_maximum("speed_m_s"),
-        "Tilt, mean and maximum [rad]": _mean_and_maximum("tilt_rad"),
+        "Root mean square error [m]": _part("rmse_m", "total"),
+        "Root mean square error, x, y, z [m]": _part("rmse_m", "x", "y", "z"),
+        "Deviation, p50, p90, p99 [m]": _part("deviation_percentiles_m", "p50", "p90", "p99"),
+        "Cross-track error, mean and maximum [m]": _part("cross_track_m", "mean", "max"),
+        "Along-track error, mean and maximum [m]": _part("along_track_m", "mean", "max"),
+        "Path length [m]": _number("path_length_m", 2),
+        "Speed, mean and maximum [m/s]": _part("speed_m_s", "mean", "max"),
+        "Tilt, mean and maximum [rad]": _part("tilt_rad", "mean", "max"),
+        "Jerk, rms and maximum [m/s^3]": _part("jerk_m_s3", "rms", "max", digits=2),
+        "Input effort, roll, pitch [rad]": _part("input_effort", "roll_rad", "pitch_rad"),
+        "Time in saturation [s]": _part("saturation", "time_s", digits=2),
+        "Solver iterations, p50, p99, max": _part(
+            "solver_iterations", "p50", "p99", "max", digits=0
+        ),
+        "Solve time, p50 and p99 [ms]": _part("solve_time_ms", "p50", "p99"),
+        "Automatic and manual time [s]": _both("automatic_time_s", "manual_time_s"),
+        "Time on rungs below the first plan [s]": _lower_rungs,
+        "Battery, start and end [%]": _ends("battery_percent"),
+        "Hover thrust [%]": _part("hover_thrust_percent", "median", digits=2),
         "Command rate [Hz]": _number("command_rate_hz", 2),
         "Longest gap between commands [ms]": _number("command_gap_ms_max", 1),
         "Plans rejected by the guard": _text("plans_rejected"),
@@ -61,7 +83,7 @@ def sections(flights: Sequence[Metrics]) -> List[Section]:
 
 def as_text(flights: Sequence[Metrics]) -> str:
     """Return all tables as aligned text, and below what is missing."""
-    header = [_title(flight) for flight in flights]
+    header = [title(flight) for flight in flights]
     tables = sections(flights)
     labels = max(len(label) for _, rows in tables for label, _ in rows)
     columns = [
@@ -69,13 +91,35 @@ def as_text(flights: Sequence[Metrics]) -> str:
         for i in range(len(flights))
     ]
     lines = [_line("", header, labels, columns)]
-    for title, rows in tables:
-        lines += ["", title]
+    for name, rows in tables:
+        lines += ["", name]
         lines += [_line(label, cells, labels, columns) for label, cells in rows]
     for flight in flights:
         name = flight["bag"] or "flight"
         lines += [""] + [f"{name}: {sentence}" for sentence in flight["missing"]]
     return "\n".join(line.rstrip() for line in lines).rstrip() + "\n"
+
+
+def segments_as_text(flight: Metrics) -> str:
+    """Return a line of figures for each part of a flight; empty without parts."""
+    parts = flight.get("segments")
+    if not parts:
+        return ""
+    cells: Dict[str, Cell] = {
+        "from [s]": _number("start_s", 2),
+        "to [s]": _number("end_s", 2),
+        "automatic": _text("automatic"),
+        "deviation [m]": _number("average_deviation_m"),
+        "maximum [m]": _number("maximum_deviation_m"),
+        "path [m]": _number("path_length_m", 2),
+        "speed [m/s]": _part("speed_m_s", "mean"),
+        "p99 solve [ms]": _part("solve_time_ms", "p99"),
+        "saturated [s]": _part("saturation", "time_s", digits=2),
+    }
+    rows = [["part", *cells]] + [[p["name"], *(c(p) for c in cells.values())] for p in parts]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = [f"{row[0]:<{widths[0]}}" + _cells(row[1:], widths[1:]) for row in rows]
+    return "\n".join(["", f"Parts of {title(flight)}", *(f"  {line}" for line in lines)]) + "\n"
 
 
 def write_csv(flights: Sequence[Metrics], stream: TextIO) -> None:
@@ -90,7 +134,9 @@ def write_csv(flights: Sequence[Metrics], stream: TextIO) -> None:
 def _flat(metrics: Metrics, prefix: str = "") -> Metrics:
     flat: Metrics = {}
     for key, value in metrics.items():
-        if key in _PAIRS and value is not None:
+        if key in _NO_COLUMNS:
+            continue
+        if key in _PAIRS and isinstance(value, list):
             value = dict(zip(_PAIRS[key], value))
         if isinstance(value, dict):
             flat.update(_flat(value, f"{prefix}{key}."))
@@ -105,12 +151,15 @@ def _cell(value: Any) -> Any:
 
 
 def _line(label: str, cells: Sequence[str], labels: int, columns: Sequence[int]) -> str:
-    return f"  {label:<{labels}}" + "".join(
-        f"  {cell:>{width}}" for cell, width in zip(cells, columns)
-    )
+    return f"  {label:<{labels}}" + _cells(cells, columns)
 
 
-def _title(flight: Metrics) -> str:
+def _cells(cells: Sequence[str], widths: Sequence[int]) -> str:
+    return "".join(f"  {cell:>{width}}" for cell, width in zip(cells, widths))
+
+
+def title(flight: Metrics) -> str:
+    """Return what a column is called."""
     number = f" ({flight['flight']}/{flight['flights']})" if flight["flights"] > 1 else ""
     scenario = f" {flight['scenario']}" if flight["scenario"] else ""
     return f"{flight['bag'] or 'flight'}{number}{scenario}"
@@ -197,7 +246,30 @@ def _range(key: str) -> Cell:
     )
 
 
-def _mean_and_maximum(key: str) -> Cell:
+def _part(key: str, *parts: str, digits: int = 3) -> Cell:
+    def cell(flight: Metrics) -> str:
+        found = flight[key] or {}
+        values = [found.get(part) for part in parts]
+        return UNKNOWN if None in values else ", ".join(f"{v:.{digits}f}" for v in values)
+
+    return cell
+
+
+def _both(*keys: str) -> Cell:
     return lambda flight: (
-        UNKNOWN if flight[key] is None else f"{flight[key]['mean']:.3f}, {flight[key]['max']:.3f}"
+        UNKNOWN
+        if all(flight[key] is None for key in keys)
+        else ", ".join(_format(flight[key], 2) for key in keys)
     )
+
+
+def _ends(key: str) -> Cell:
+    return lambda flight: UNKNOWN if flight[key] is None else "{:.0f}, {:.0f}".format(*flight[key])
+
+
+def _lower_rungs(flight: Metrics) -> str:
+    times = flight["rung_time_s"]
+    if times is None:
+        return UNKNOWN
+    lower = {name: t for name, t in times.items() if name not in ("none", "new_plan", "last_plan")}
+    return ", ".join(f"{name} {t:.2f}" for name, t in lower.items()) or "0.00"

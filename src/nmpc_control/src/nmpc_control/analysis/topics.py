@@ -20,14 +20,33 @@ ROLES = {
     "obstacles": Role("nmpc/obstacles", "nmpc_msgs/msg/ObstacleArray"),
     "sensed_obstacles": Role("obstacles", "nmpc_msgs/msg/ObstacleArray"),
     "setpoint": Role("dji_sdk/flight_control_setpoint_generic", "sensor_msgs/msg/Joy"),
+    "height_setpoint": Role(
+        "dji_sdk/flight_control_setpoint_rollpitch_yawrate_zposition", "sensor_msgs/msg/Joy"
+    ),
+    "velocity_setpoint": Role(
+        "dji_sdk/flight_control_setpoint_ENUvelocity_yawrate", "sensor_msgs/msg/Joy"
+    ),
+    "position_setpoint": Role(
+        "dji_sdk/flight_control_setpoint_ENUposition_yaw", "sensor_msgs/msg/Joy"
+    ),
     "attitude": Role("dji_sdk/attitude", "geometry_msgs/msg/QuaternionStamped"),
     "imu": Role("dji_sdk/imu", "sensor_msgs/msg/Imu"),
     "velocity": Role("dji_sdk/velocity", "geometry_msgs/msg/Vector3Stamped"),
     "local_position": Role("dji_sdk/local_position", "geometry_msgs/msg/PointStamped"),
+    "world_position": Role("world_position", "geometry_msgs/msg/PointStamped"),
+    "paper_reference": Role("tune/ref_position", "geometry_msgs/msg/PointStamped"),
     "flight_status": Role("dji_sdk/flight_status", "std_msgs/msg/UInt8"),
+    "rc": Role("dji_sdk/rc", "sensor_msgs/msg/Joy"),
+    "battery": Role("dji_sdk/battery_state", "sensor_msgs/msg/BatteryState"),
     "truth": Role("uav_sim/ground_truth", "nav_msgs/msg/Odometry"),
     "collision": Role("uav_sim/collision", "std_msgs/msg/String"),
+    "goal": Role("fly_trajectory/goal", "nmpc_msgs/msg/FlyTrajectoryActionGoal"),
+    "result": Role("fly_trajectory/result", "nmpc_msgs/msg/FlyTrajectoryActionResult"),
+    "parameters": Role("nmpc/parameters", "std_msgs/msg/String"),
+    "tf": Role("tf", "tf2_msgs/msg/TFMessage"),
+    "log": Role("rosout", "rosgraph_msgs/msg/Log"),
 }
+_COMMON = ("tf", "log")  # of all vehicles, outside of their namespaces
 MAV_COMMAND = "mav_msgs/msg/RollPitchYawrateThrust"  # its topic has no usual name
 
 Connections = Dict[str, List[Any]]  # role to the bag's connections
@@ -46,10 +65,14 @@ def select(connections: Sequence[Any], namespace: Optional[str] = None) -> Selec
     """Return one vehicle's connections by role; without a namespace, the best recorded one's."""
     vehicles: Dict[str, Connections] = {}
     commands: Dict[str, List[Any]] = {}
+    common: Connections = {}
     remarks = []
     for connection in connections:
         role, prefix = _role(connection.topic)
-        if role is not None and connection.msgtype == ROLES[role].msgtype:
+        if role in _COMMON:
+            if connection.msgtype == ROLES[role].msgtype:
+                common.setdefault(role, []).append(connection)
+        elif role is not None and connection.msgtype == ROLES[role].msgtype:
             vehicles.setdefault(prefix, {}).setdefault(role, []).append(connection)
         elif connection.msgtype == MAV_COMMAND:
             commands.setdefault(connection.topic, []).append(connection)
@@ -66,6 +89,10 @@ def select(connections: Sequence[Any], namespace: Optional[str] = None) -> Selec
     own = [group for topic, group in commands.items() if topic.startswith(chosen + "/")]
     if "setpoint" not in found and own:
         found["mav_command"] = max(own, key=lambda group: sum(c.msgcount for c in group))
+    if found:
+        found.update(common)
+    if "odometry" in found:
+        found.pop("tf", None)  # says nothing more, and there is much of it
     is_simulation = any("uav_sim" in connection.topic.split("/") for connection in connections)
     return Selection(chosen, found, is_simulation, tuple(remarks))
 

@@ -6,6 +6,7 @@ from typing import List, Optional
 import numpy as np
 
 from nmpc_control.analysis.deviation import arrival_time, errors, path_deviation
+from nmpc_control.analysis.following import following_figures
 from nmpc_control.analysis.record import FlightRecord, Metrics, Reference, Series
 from nmpc_control.analysis.windows import Window
 
@@ -21,6 +22,7 @@ def reference_figures(
     figures = _deviation_figures(None, "")
     figures.update(_deviation_figures(None, "_truth"))
     figures.update(average_deviation_after_6s_m=None, average_path_deviation_m=None, rmse_m=None)
+    figures.update(following_figures(None, None))
     figures.update(_retimed_figures(record, window, missing))
     figures.update(scenario_time_s=None, reference_length_m=None)
     reference = record.reference
@@ -41,6 +43,7 @@ def reference_figures(
         error = errors(record.position, reference, window.start, window.reference_end)
         figures.update(_deviation_figures(error, ""))
         figures.update(_estimate_figures(record.position, reference, error, window))
+        figures.update(following_figures(error, reference))
         if not len(error):
             missing.append(
                 "no position estimate while the reference ran: no deviation of the estimate"
