@@ -12,7 +12,7 @@ from uav_sim.closed_loop.bench.paper_backend import PaperBackend
 from uav_sim.closed_loop.bench.problem import Problem
 from uav_sim.closed_loop.bench.recording import structure_of
 
-TOLERANCE = 1e-7  # of "converged"
+TOLERANCE = 1e-9  # of "converged"
 _IPOPT_TOLERANCE = 1e-6
 _TIGHT = {"constr_viol_tol": 1e-9, "dual_inf_tol": 1e-6, "compl_inf_tol": 1e-9}
 _LAST_STRAW = 60.0  # [s] for a solve that shall not be stopped
