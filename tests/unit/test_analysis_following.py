@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Along and across the reference, inputs at their bounds, jerk, streams, timeline and parts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from analysis_bags import BagBuilder, Flight
@@ -171,6 +173,23 @@ def test_streams_battery_and_units(flight):
     assert metrics["units"]["rate_hz"] == "Hz"
     assert metrics["units"]["jerk_m_s3"] == "m/s^3"
     assert metrics["units"]["average_deviation_m"] == "m"
+
+
+def test_hover_thrust_is_that_of_standing_still_not_of_passing_through():
+    times = np.arange(0.0, 40.0, 0.02)
+    speed = np.where(times < 20.0, 2.0 * np.sin(times), 0.0)
+    thrust = np.where(times < 20.0, 50.0, 38.0)
+    record = FlightRecord(
+        velocity=Series(times, np.outer(speed, [1.0, 0.0, 0.0])),
+        attitude=Series(times, np.zeros((len(times), 3))),
+        commands=Series(times, np.stack([thrust, *np.zeros((3, len(times)))], axis=1)),
+        airborne=(0.0, 40.0),
+    )
+    hover = flight_metrics(record)["hover_thrust_percent"]
+    assert (hover["median"], hover["p5"]) == (38.0, 38.0)
+    moving = flight_metrics(replace(record, airborne=(0.0, 19.0)))
+    assert moving["hover_thrust_percent"] is None
+    assert "hardly hovered" in " ".join(moving["missing"])
 
 
 def test_topics_of_the_papers_code(tmp_path):

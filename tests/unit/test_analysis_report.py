@@ -7,13 +7,17 @@ import shutil
 import subprocess
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 from analysis_bags import Flight, header
 
 from nmpc_control.analysis.bag import read_flight
 from nmpc_control.analysis.figures import write_figures
 from nmpc_control.analysis.metrics import flight_metrics
+from nmpc_control.analysis.record import FlightRecord, Series
 from nmpc_control.analysis.report import html_report
+from nmpc_control.analysis.scene import scene_figure
+from nmpc_control.analysis.windows import Window
 
 BROWSER = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -136,3 +140,17 @@ def test_browser_draws_all_figures_and_runs_nothing_of_the_bag(page, tmp_path):
         DRAWN
     )
     assert any(t == "canvas" for t, _ in parser.found)
+
+
+@pytest.mark.parametrize("thickness", [0.0, 0.02, 5.0])
+def test_a_metre_is_a_metre_on_all_axes_of_the_scene(thickness):
+    angle = np.linspace(0.0, 6.0, 200)
+    circle = np.stack([9.0 * np.cos(angle), 4.0 * np.sin(angle), thickness * angle / 6.0], axis=1)
+    record = FlightRecord(position=Series(angle, circle))
+    scene = scene_figure(record, Window(0.0, 6.0, 6.0), 0.5).layout.scene
+    ranges = np.array([scene[f"{name}axis"].range for name in "xyz"], dtype=float)
+    ratio = np.array([scene.aspectratio[name] for name in "xyz"])
+    assert ratio == pytest.approx(np.diff(ranges).ravel() / np.diff(ranges).max())
+    assert (ranges[:, 0] <= circle.min(axis=0)).all()
+    assert (ranges[:, 1] >= circle.max(axis=0)).all()
+    assert ratio.min() > 0.25

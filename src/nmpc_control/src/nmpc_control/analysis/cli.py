@@ -19,7 +19,10 @@ from nmpc_control.errors import BagError, ConfigError
 
 def main(argv: Optional[Sequence[str]] = None) -> None:
     """Run the command; exits with status 2 on bad input."""
-    arguments = parser().parse_args(argv)
+    options = parser()
+    arguments = options.parse_args(argv)
+    if arguments.between and not arguments.between[0] < arguments.between[1]:
+        options.error("argument --between: expected START before END")
     try:
         limits = arguments.vehicle and controller_limits(arguments.vehicle)
     except ConfigError as error:

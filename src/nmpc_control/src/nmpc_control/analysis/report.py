@@ -160,8 +160,7 @@ def _provenance(record: FlightRecord) -> str:
         for name, value in (*analysed_by().items(), ("Python", platform.python_version()))
     )
     given = (
-        f"<p>As the controller published them in nmpc/parameters:</p><pre>"
-        f"{escape(record.parameters)}</pre>"
+        f"<p>As recorded in nmpc/parameters:</p><pre>{escape(record.parameters)}</pre>"
         if record.parameters
         else '<p class="note">The bag holds no nmpc/parameters: what the controller was set to, '
         "and its commit, are not known from it.</p>"

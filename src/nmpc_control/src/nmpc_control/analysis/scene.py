@@ -2,7 +2,7 @@
 """The flight in space, to be turned in a browser: reference, flown path, obstacles."""
 
 from html import escape
-from typing import List, Optional
+from typing import Any, Dict, List, Optional
 
 import numpy as np
 import plotly.graph_objects as go
@@ -15,6 +15,7 @@ from nmpc_control.analysis.windows import Window
 
 SAFETY_DISTANCE = 0.5  # [m] from the hull: the shell that is drawn around an obstacle
 _MOST_OBSTACLES = 40  # drawn with their names
+_EYE = {"x": 0.75, "y": -1.15, "z": 0.65}  # of the camera, in lengths of the longest axis
 _FINE = (49, 25)  # points around and up a surface
 _MOST_PATH = 3000  # points of a path
 
@@ -40,23 +41,43 @@ def scene_figure(
     if len(flown):
         _mark(figure, flown.values[0], "start", "circle")
         _mark(figure, flown.values[-1], "end", "square")
-    axis = {"backgroundcolor": "#f8f9fa", "gridcolor": "#dee2e6", "zerolinecolor": "#adb5bd"}
     figure.update_layout(
-        scene={
-            "aspectmode": "data",
-            "xaxis": {"title": "x [m]", **axis},
-            "yaxis": {"title": "y [m]", **axis},
-            "zaxis": {"title": "z [m]", **axis},
-            "camera": {
-                "eye": {"x": 1.2, "y": -1.7, "z": 0.9},
-                "center": {"x": 0, "y": 0, "z": -0.15},
-            },
-        },
+        scene=_space(record, flown, vehicle_radius),
         height=620,
         margin={"l": 0, "r": 0, "t": 10, "b": 0},
         legend={"x": 0.01, "y": 0.99, "bgcolor": "rgba(255,255,255,0.8)"},
     )
     return figure
+
+
+def _space(record: FlightRecord, flown: Series, vehicle_radius: float) -> Dict[str, Any]:
+    """Return axes on which a metre is a metre, with everything in view and never flat."""
+    points = [flown.values]
+    if record.reference is not None:
+        points.append(record.reference.path.values)
+    for track in (record.obstacles or ())[:_MOST_OBSTACLES]:
+        centres = track.centre_at(flown.times[:: max(1, len(flown) // 100)])
+        reach = track.obstacle.size.max() + SAFETY_DISTANCE + vehicle_radius
+        points += [centres - reach, centres + reach]
+    corners = [corner for part in points if len(part) for corner in (part.min(0), part.max(0))]
+    low, high = np.min(corners or [np.zeros(3)], axis=0), np.max(corners or [np.ones(3)], axis=0)
+    size = np.maximum(high - low, 0.3 * (high - low).max() + 0.1) * 1.05
+    middle, ratio = (low + high) / 2.0, size / size.max()
+    style = {"backgroundcolor": "#f8f9fa", "gridcolor": "#dee2e6", "zerolinecolor": "#adb5bd"}
+    axes = {
+        f"{name}axis": {
+            "title": f"{name} [m]",
+            "range": [float(m - s / 2.0), float(m + s / 2.0)],
+            **style,
+        }
+        for name, m, s in zip("xyz", middle, size)
+    }
+    return {
+        **axes,
+        "aspectmode": "manual",
+        "aspectratio": dict(zip("xyz", ratio.tolist())),
+        "camera": {"eye": _EYE, "center": {"x": 0.0, "y": 0.0, "z": -0.1}},
+    }
 
 
 def _manual(record: FlightRecord, flown: Series) -> List[Series]:

@@ -69,7 +69,7 @@ def _by_time(record: FlightRecord, length: float) -> List[Part]:
     count = min(math.ceil((window.end - window.start) / length), _MOST)
     edges = [min(window.start + k * length, window.end) for k in range(count + 1)]
     return [
-        Part(f"{a - window.start:g} to {b - window.start:g} s", a, b, None)
+        Part(f"{a - window.start:.4g} to {b - window.start:.4g} s", a, b, None)
         for a, b in zip(edges[:-1], edges[1:])
     ]
 

@@ -6,12 +6,13 @@ from typing import List, Optional
 import numpy as np
 
 from nmpc_control.analysis.record import FlightRecord, Metrics
-from nmpc_control.analysis.windows import Window
+from nmpc_control.analysis.windows import Window, runs
 from nmpc_control.state import THRUST
 
 _HOVER_SPEED, _HOVER_CLIMB = 0.3, 0.15  # [m/s] slower counts as hovering
 _HOVER_TILT = 0.1  # [rad]
 _LEAST_HOVER = 25  # commands
+_SHORTEST_HOVER = 1.0  # [s]
 
 
 def stream_figures(record: FlightRecord, window: Optional[Window], missing: List[str]) -> Metrics:
@@ -70,4 +71,8 @@ def _hovering(record: FlightRecord) -> Optional[np.ndarray]:
         np.abs(velocity[:, 2]) < _HOVER_CLIMB
     )
     is_level = np.hypot(attitude[:, 0], attitude[:, 1]) < _HOVER_TILT
-    return thrust[is_still & is_level & np.isfinite(thrust)]
+    hovers = is_still & is_level
+    for start, end in runs(commands.times, hovers):
+        if end - start < _SHORTEST_HOVER:  # on its way through standstill
+            hovers &= (commands.times < start) | (commands.times > end)
+    return thrust[hovers & np.isfinite(thrust)]
