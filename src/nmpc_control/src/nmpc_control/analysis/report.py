@@ -4,7 +4,7 @@
 import json
 import platform
 from html import escape
-from typing import Dict, List, Optional
+from typing import Dict, List, Optional, Tuple
 
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
@@ -63,7 +63,7 @@ def html_report(record: FlightRecord, metrics: Metrics) -> str:
     )
 
 
-def _drawings(record: FlightRecord, metrics: Metrics) -> "List[tuple[str, str]]":
+def _drawings(record: FlightRecord, metrics: Metrics) -> List[Tuple[str, str]]:
     window = scenario_window(record)
     figures: Dict[str, Optional[go.Figure]] = {}
     if window is not None:
