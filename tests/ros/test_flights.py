@@ -9,6 +9,7 @@ from typing import Any, Dict, List, NamedTuple, Optional
 
 import numpy as np
 import pytest
+import yaml
 from ros_session import free_port, workspace_environment
 
 from nmpc_control.analysis.bag import read_flight
@@ -138,6 +139,12 @@ def test_the_figures_promised_to_users_are_there(name, request):
     assert 10.0 <= low < 39.0  # hover is at 38.4 %
     assert 38.0 < high <= 100.0
     assert 0.0 < metrics["navigation_time_s"] < metrics["total_time_s"]
+
+
+def test_what_everything_was_set_to_is_in_the_bag(hexagon):
+    recorded = yaml.safe_load(read_flight(hexagon.bag).parameters)
+    assert recorded["parameters"]["nmpc_controller"]["vehicle"] == "dji_hil"
+    assert recorded["commit"]
 
 
 @pytest.mark.parametrize("name", ["hexagon", "multi_obstacle"])

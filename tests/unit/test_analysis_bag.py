@@ -136,6 +136,7 @@ def test_two_trajectories_in_one_bag(tmp_path):
     assert last["average_deviation_m"] == pytest.approx(0.1, abs=1e-9)
     assert list(last["clearance_m"]) == ["post"]
     assert last["total_time_s"] == pytest.approx(24.0)
+    assert "the bag holds 2 flights: this is the last of them" in last["missing"]
     one = flight_metrics(read_flight(path, flight=1))
     assert (one["flight"], one["scenario"]) == (1, "first")
     assert one["average_deviation_m"] == pytest.approx(0.25, abs=1e-9)

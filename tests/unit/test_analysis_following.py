@@ -14,8 +14,8 @@ from nmpc_control.analysis.metrics import flight_metrics
 from nmpc_control.analysis.motion import jerk
 from nmpc_control.analysis.record import FlightRecord, Reference, Series
 from nmpc_control.analysis.segments import parts
-from nmpc_control.analysis.timeline import periods
-from nmpc_control.analysis.windows import Window
+from nmpc_control.analysis.timeline import periods, shown_window
+from nmpc_control.analysis.windows import Window, scenario_window
 from nmpc_control.mode_inputs import Mode
 
 DIAGONAL = Reference(0.0, Series([0.0, 10.0, 20.0], [[0, 0, 0], [30, 40, 0], [30, 40, 0]]))
@@ -237,3 +237,19 @@ def test_position_of_the_motion_capture_frame(tmp_path):
     record = read_flight(bag.write(tmp_path / "vicon.bag"))
     assert record.position.values[-1] == pytest.approx([0.99, 0.0, 1.0])
     assert "no nmpc/odometry: position is /tf of mat2" in record.missing[0]
+
+
+def test_drawings_show_what_was_flown_by_hand_too():
+    times = np.arange(0.0, 40.0, 0.02)
+    record = FlightRecord(
+        position=Series(times, np.zeros((len(times), 3))),
+        reference=Reference(6.0, Series([0.0, 30.0], np.zeros((2, 3)))),
+        status=manual_status(),
+        airborne=(4.0, 34.0),
+    )
+    assert scenario_window(record).end == pytest.approx(15.0, abs=0.03)
+    shown = shown_window(record)
+    assert (shown.start, shown.end) == pytest.approx((6.0, 34.0), abs=0.03)
+    assert shown.reference_end == pytest.approx(34.0, abs=0.03)
+    never = replace(record, status=None)
+    assert shown_window(never) == scenario_window(never)

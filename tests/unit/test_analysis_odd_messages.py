@@ -104,3 +104,13 @@ def test_topic_of_another_type_is_named(flight, tmp_path):
     figures = flight_metrics(read_flight(builder.write(tmp_path / "type.bag")))
     assert "/nmpc/plan has type std_msgs/msg/String: not read" in figures["missing"]
     assert figures["solver_iterations_mean"] is None
+
+
+def test_stamps_of_another_clock_are_named(flight, tmp_path):
+    builder = flight.without("dji_sdk/battery_state")
+    for k in range(20):
+        values = {"header": {"stamp": {"sec": 5 + k, "nanosec": 0}}, "percentage": 80.0}
+        builder.add("dji_sdk/battery_state", "sensor_msgs/msg/BatteryState", 105.0 + k, values)
+    missing = " ".join(read_flight(builder.write(tmp_path / "clock.bag")).missing)
+    assert "dji_sdk/battery_state: stamps are 100.0 s from the time of recording" in missing
+    assert "odometry" not in missing

@@ -63,6 +63,8 @@ def read_flights(
         return [_record(path.name, recording, number) for number in range(1, max(1, count) + 1)]
     if flight is not None and not 1 <= flight <= max(1, count):
         raise BagError(f"has {count} flights, expected at least {flight}")
+    if flight is None and count > 1:
+        recording.remarks.append(f"the bag holds {count} flights: this is the last of them")
     return [_record(path.name, recording, count if flight is None else int(flight))]
 
 

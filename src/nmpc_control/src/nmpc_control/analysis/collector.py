@@ -12,6 +12,7 @@ from nmpc_control.analysis.topics import ROLES
 
 _BATCH_BYTES = 1 << 22  # raw messages of one connection that are held before they are decoded
 _MOST_EVENTS = 500_000  # of one role
+_LARGEST_OFFSET = 5.0  # [s] of stamps from the time of recording
 
 Rows = Tuple[np.ndarray, np.ndarray]  # times (n,) [s], values (n, k)
 
@@ -39,6 +40,7 @@ class Collector:
         self._rows: Dict[str, List[Rows]] = {}
         self._events: Dict[str, List[Event]] = {}
         self._unusable: Dict[str, int] = {}
+        self._offsets: Dict[str, float] = {}  # [s] between stamps and recording
 
     def add(self, connection_id: int, time: int, raw: bytes) -> None:
         """Take one raw message, recorded at a time [ns]."""
@@ -65,6 +67,12 @@ class Collector:
                 found[role] = times, values
         for role, count in self._unusable.items():
             remarks.append(f"{_name(role)}: {count} messages cannot be used: left out")
+        for role, offset in self._offsets.items():
+            if offset > _LARGEST_OFFSET:
+                remarks.append(
+                    f"{_name(role)}: stamps are {offset:.1f} s from the time of recording: "
+                    "its clock is another one"
+                )
         for events in self._events.values():
             events.sort(key=lambda event: event.time)
         return found, self._events, remarks
@@ -119,7 +127,11 @@ class Collector:
             except Exception:  # fields that are absent, or are not numbers
                 continue
             if stamps is not None:
-                times = np.where(stamps != 0, stamps, times)
+                given = stamps != 0
+                if given.any():
+                    offset = abs(float(np.median((stamps - times)[given]))) * 1e-9
+                    self._offsets[role] = max(self._offsets.get(role, 0.0), offset)
+                times = np.where(given, stamps, times)
             order = np.argsort(numbers)
             self._rows.setdefault(role, []).append((self._seconds(times[order]), values[order]))
             used += len(numbers)

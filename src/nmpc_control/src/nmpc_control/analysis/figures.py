@@ -23,8 +23,8 @@ from nmpc_control.analysis.palette import (
 )
 from nmpc_control.analysis.record import SOLVE_TIME, FlightRecord, ObstacleTrack, Series
 from nmpc_control.analysis.surfaces import surface
-from nmpc_control.analysis.timeline import periods
-from nmpc_control.analysis.windows import Window, scenario_window
+from nmpc_control.analysis.timeline import periods, shown_window
+from nmpc_control.analysis.windows import Window
 from nmpc_control.state import PITCH_REF, ROLL_REF, THRUST, YAW_RATE_REF
 
 SAFETY_DISTANCE = 0.5  # [m] from the hull: the shell that is drawn around an obstacle
@@ -37,7 +37,7 @@ def write_figures(
     record: FlightRecord, directory: Path, stem: str, vehicle_radius: float
 ) -> List[Path]:
     """Write ``<stem>_<figure>.pdf`` for all figures that can be drawn; return the files."""
-    window = scenario_window(record)
+    window = shown_window(record)
     written: List[Path] = []
     if window is None:
         return written
@@ -136,7 +136,7 @@ def deviation_figure(
         distance = np.linalg.norm(error.values, axis=1)
         axes.plot(error.times, distance, color=_COLOURS[name], label=f"from the reference, {name}")
     if record.position is not None:
-        flown = record.position.between(window.start, window.reference_end)
+        flown = record.position.between(record.reference.start, window.reference_end)
         nearest = path_deviation(flown.values, record.reference.path.values)
         axes.plot(flown.times - window.start, nearest, color=REFERENCE, label="from its path")
     axes.set(xlabel="time [s]", ylabel="deviation [m]")
@@ -208,7 +208,7 @@ def _errors(record: FlightRecord, window: Window) -> Dict[str, Series]:
         return {}
     positions = {"estimate": record.position, "truth": record.true_position}
     found = {
-        name: errors(position, record.reference, window.start, window.reference_end)
+        name: errors(position, record.reference, record.reference.start, window.reference_end)
         for name, position in positions.items()
         if position is not None
     }

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The error of a flight in more detail: along and across the reference, percentiles, axes."""
 
-from typing import Dict, Optional
+from typing import Dict, Optional, Tuple
 
 import numpy as np
 
@@ -38,7 +38,7 @@ def following_figures(error: Optional[Series], reference: Optional[Reference]) -
     return figures
 
 
-def track_errors(error: Series, reference: Reference) -> "tuple[np.ndarray, np.ndarray]":
+def track_errors(error: Series, reference: Reference) -> Tuple[np.ndarray, np.ndarray]:
     """Return the error along the reference's motion (positive: ahead) and across it (m,) [m].
 
     Moments in which the reference stands still have no direction: they are left out.

@@ -7,7 +7,7 @@ The messages stay as they are, in ROS 1's own encoding, so nothing is decoded.
 import argparse
 import sys
 from pathlib import Path
-from typing import Any, Dict, Iterable, List, Optional, Sequence
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
 
 from mcap.writer import Writer
 
@@ -47,7 +47,7 @@ def main(argv: Optional[Sequence[str]] = None) -> None:
         sys.exit(2)
 
 
-def convert(bag: Path, target: Path) -> "tuple[int, List[str]]":
+def convert(bag: Path, target: Path) -> Tuple[int, List[str]]:
     """Write the bag's messages to an MCAP file; return their number and what was wrong with it.
 
     Raises:

@@ -4,17 +4,17 @@
 import json
 import platform
 from html import escape
-from typing import Dict, List, Optional
+from typing import Dict, List, Optional, Tuple
 
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
-from nmpc_control.analysis import plots
+from nmpc_control.analysis import bars, plots
 from nmpc_control.analysis.provenance import analysed_by
 from nmpc_control.analysis.record import FlightRecord, Metrics
 from nmpc_control.analysis.scene import scene_figure
 from nmpc_control.analysis.tables import sections
-from nmpc_control.analysis.windows import scenario_window
+from nmpc_control.analysis.timeline import shown_window
 
 _STYLE = """\
 body{font:15px/1.45 system-ui,sans-serif;max-width:1100px;margin:0 auto;padding:1em;color:#212529}
@@ -63,13 +63,13 @@ def html_report(record: FlightRecord, metrics: Metrics) -> str:
     )
 
 
-def _drawings(record: FlightRecord, metrics: Metrics) -> "List[tuple[str, str]]":
-    window = scenario_window(record)
+def _drawings(record: FlightRecord, metrics: Metrics) -> List[Tuple[str, str]]:
+    window = shown_window(record)
     figures: Dict[str, Optional[go.Figure]] = {}
     if window is not None:
         radius = metrics["vehicle_radius_m"]
         figures["Flight in space"] = scene_figure(record, window, radius)
-    figures["Timeline"] = plots.timeline_figure(record)
+    figures["Timeline"] = bars.timeline_figure(record)
     if window is not None:
         for name, rows in (
             ("Errors", plots.error_rows(record, window)),
@@ -78,7 +78,7 @@ def _drawings(record: FlightRecord, metrics: Metrics) -> "List[tuple[str, str]]"
             ("Solver and guard", plots.solver_rows(record)),
         ):
             figures[name] = plots.time_figure(rows, record, window)
-        figures["Solve times"] = plots.histogram_figure(record, window)
+        figures["Solve times"] = bars.histogram_figure(record, window)
     return [(name, _embedded(name, figure)) for name, figure in figures.items() if figure]
 
 

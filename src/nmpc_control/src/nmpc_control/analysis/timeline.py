@@ -13,6 +13,7 @@ from nmpc_control.analysis.record import (
     Metrics,
     Series,
 )
+from nmpc_control.analysis.windows import Window, scenario_window
 from nmpc_control.dji import RC_SWITCH_TOLERANCE
 from nmpc_control.ladder import Rung
 from nmpc_control.mode_inputs import AUTOMATIC, Mode
@@ -41,6 +42,25 @@ def periods(record: FlightRecord) -> List[Period]:
     if record.airborne is not None:
         return [Period(*record.airborne, "in the air", None, None)]
     return []
+
+
+def shown_window(record: FlightRecord) -> Optional[Window]:
+    """Return what drawings show: the evaluated time, with what was flown by hand before and after.
+
+    Errors are shown as long as the reference's own time runs.
+    """
+    window = scenario_window(record)
+    flown = [p for p in periods(record) if p.automatic is not None]
+    by_hand = [p for p in flown if not p.automatic]
+    if window is None or not by_hand:
+        return window
+    start, end = min(window.start, by_hand[0].start), max(window.end, flown[-1].end)
+    if record.airborne is not None:
+        start = min(window.start, max(start, record.airborne[0]))
+        end = max(window.end, min(end, record.airborne[1]))
+    reference = record.reference
+    last = end if reference is None else min(end, reference.start + reference.duration)
+    return Window(start, max(window.reference_end, last), end)
 
 
 def _of_status(status: Series) -> List[Period]:
