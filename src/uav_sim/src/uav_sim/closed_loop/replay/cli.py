@@ -6,11 +6,9 @@ import json
 import math
 import sys
 from pathlib import Path
-from typing import Any, Dict, Iterable, Optional, Sequence
+from typing import Any, Dict, Optional, Sequence
 
-from rich.console import Console
-from rich.progress import track
-
+from nmpc_control.analysis.progress import progress_of
 from nmpc_control.errors import BagError
 from uav_sim.closed_loop.replay.figure import write_figure
 from uav_sim.closed_loop.replay.recorded import read_recorded
@@ -20,7 +18,6 @@ from uav_sim.preset import preset_names
 from uav_sim.spread import any_preset
 
 PROGRAM = "replay"
-_ERRORS = Console(stderr=True)
 _EPILOG = f"""\
 Segments in the air are split where the ground is touched, and begin with the recorded velocity and
 attitude. fit = 100 (1 - |y - y_model| / |y - mean y|) over all segments; R^2 of vertical velocity
@@ -34,7 +31,7 @@ def main(argv: Optional[Sequence[str]] = None) -> None:
     """Run the command; exits with status 2 on bad input."""
     options = _parser().parse_args(argv)
     try:
-        recorded = read_recorded(options.bag, options.namespace, _progress)
+        recorded = read_recorded(options.bag, options.namespace, progress_of(options.bag))
         result = replay(
             recorded, any_preset(options.plant), options.start, options.end, options.attitude_scale
         )
@@ -79,12 +76,6 @@ def _write(options: argparse.Namespace, result: Replay, figures: Dict[str, Any])
     write_figure(result, image, f"{options.bag.name} through {options.plant}")
     if not options.quiet:
         sys.stdout.write(f"figure: {image}\n")
-
-
-def _progress(messages: Iterable[Any], count: int) -> Iterable[Any]:
-    return track(
-        messages, "reading", count, transient=True, disable=not sys.stderr.isatty(), console=_ERRORS
-    )
 
 
 def _number(value: Optional[float], digits: int) -> str:
