@@ -74,7 +74,7 @@ def _hover(motion: Motion, thrust_map: Map) -> np.ndarray:
     """Return the thrust (w,) [percent] that would have hovered in each window."""
     up = motion.up[:, 2]
     mean_up = motion.mean(up)
-    percent = motion.mean(motion.percent(thrust_map.dead_time) * up) / mean_up
+    percent = motion.mean(motion.percent(*thrust_map.late) * up) / mean_up
     climb = motion.mean(motion.speed[:, 2])
     lift = motion.acceleration[:, 2] + GRAVITY + thrust_map.vertical_drag * climb
     return percent + (GRAVITY - lift / mean_up) / thrust_map.slope

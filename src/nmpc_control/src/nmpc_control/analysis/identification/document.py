@@ -21,6 +21,7 @@ UNITS = {
     "tilt_limit_rad": "rad, norm of the commanded (roll, pitch)",
     "thrust.slope": "m/s^2 per percent",
     "thrust.offset": "m/s^2",
+    "thrust.lag_s": "s, time constant of first order after the dead time",
     "thrust.hover_percent": "percent",
     "thrust.charge_percent": "percent of charge, where the offset moves with it: at this one",
     "thrust.offset_per_charge": "m/s^2 per percent of charge",

@@ -98,7 +98,7 @@ def _unexplained(motions: Sequence[Motion], thrust_map: Map, lag: float) -> np.n
     """Return the acceleration (2 w,) [m/s^2] that thrust does not explain: all of x, then of y."""
     rows = []
     for motion in motions:
-        thrust = thrust_map.thrust(motion.percent(thrust_map.dead_time))
+        thrust = thrust_map.thrust(motion.percent(*thrust_map.late))
         force = motion.mean(thrust[:, None] * motion.up_late(lag)[:, :2])
         rows.append((motion.acceleration[:, :2] - force).T.ravel())
     return np.concatenate(rows)

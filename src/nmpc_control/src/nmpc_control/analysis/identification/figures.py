@@ -15,6 +15,7 @@ from nmpc_control.analysis.identification.identify import Identification
 from nmpc_control.analysis.identification.output_error import Fit
 from nmpc_control.analysis.identification.passages import Passage
 from nmpc_control.analysis.identification.segments import FLIGHT, KINDS, LIMITED
+from nmpc_control.analysis.identification.thrust_fit import Late
 from nmpc_control.analysis.identification.translation import Motion
 from nmpc_control.state import GRAVITY
 
@@ -84,7 +85,7 @@ def thrust_figure(found: Identification) -> Optional[Figure]:
     if thrust.map is None or thrust.fit is None:
         return None
     measured = np.concatenate([_lift(m, thrust.map.vertical_drag) for m in thrust.motions])
-    percent = np.concatenate([_percent(m, thrust.map.dead_time) for m in thrust.motions])
+    percent = np.concatenate([_percent(m, thrust.map.late) for m in thrust.motions])
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     left, right = figure.subplots(1, 2)
     chosen = thrust.fit.used
@@ -92,7 +93,7 @@ def thrust_figure(found: Identification) -> Optional[Figure]:
     left.plot(*_thin(percent[~chosen], measured[~chosen]), ".", ms=1.5, color="lightgrey")
     ends = np.array([percent.min(), percent.max()])
     left.plot(ends, thrust.map.thrust(ends), color=MODEL, label="map")
-    left.set(xlabel="thrust [%], after the dead time", ylabel="thrust [m/s$^2$]")
+    left.set(xlabel="thrust [%], after dead time and lag", ylabel="thrust [m/s$^2$]")
     left.set_ylim(*np.percentile(measured, [0.5, 99.5]) + np.array([-1.0, 1.0]))
     left.legend()
     _residual_over_time(right, thrust.motions, thrust.fit.residuals, thrust.fit.used)
@@ -197,9 +198,9 @@ def _lift(motion: Motion, vertical_drag: float) -> np.ndarray:
     return lift / motion.mean(motion.up[:, 2])
 
 
-def _percent(motion: Motion, dead_time: float) -> np.ndarray:
+def _percent(motion: Motion, late: Late) -> np.ndarray:
     up = motion.up[:, 2]
-    return motion.mean(motion.percent(dead_time) * up) / motion.mean(up)
+    return motion.mean(motion.percent(*late) * up) / motion.mean(up)
 
 
 def _thin(x: np.ndarray, y: np.ndarray) -> Curve:

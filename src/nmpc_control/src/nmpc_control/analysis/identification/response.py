@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 GRID = 0.005  # [s] step of the grid that responses are computed on
 LONGEST_DEAD_TIME = 0.4  # [s]
+_SHORTEST_LAG = 1e-6  # [s] below, there is none
 
 
 class Order(NamedTuple):
@@ -56,6 +57,34 @@ def held_mean(times: np.ndarray, values: np.ndarray, grid: np.ndarray) -> np.nda
     integral = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(areas, axis=0)])
     at_grid = np.stack([np.interp(grid, edges, column) for column in integral.T], axis=1)
     return np.diff(at_grid, axis=0) / np.diff(grid)[:, None]
+
+
+def lagged_mean(times: np.ndarray, values: np.ndarray, grid: np.ndarray, lag: float) -> np.ndarray:
+    """Return the mean in each interval of a grid of held values behind a first-order lag.
+
+    Exact for values that change at any moment; before the first one, it had settled on that.
+
+    Args:
+        times: (c,) [s] from when on each value holds.
+        values: (c,)
+        grid: (m + 1,) [s] within or after ``times``.
+        lag: [s] time constant; 0: none.
+
+    Returns:
+        (m,)
+    """
+    mean = held_mean(times, values[:, None], grid)[:, 0]
+    if lag < _SHORTEST_LAG:
+        return mean
+    state, states = values[0], [values[0]]
+    for value, decay in zip(values.tolist(), np.exp(-np.diff(times) / lag).tolist()):
+        state = value + decay * (state - value)
+        states.append(state)
+    held = np.clip(np.searchsorted(times, grid, side="right") - 1, 0, None)
+    since = np.maximum(grid - times[held], 0.0)
+    at_grid = values[held] + np.exp(-since / lag) * (np.array(states)[held] - values[held])
+    # lag y' = u - y, integrated over an interval
+    return mean - lag * np.diff(at_grid) / np.diff(grid)
 
 
 def respond(order: Order, shape: Sequence[float], u: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ _UNITS = {
     "omega": "rad/s",
     "time_constant_s": "s",
     "dead_time_s": "s",
+    "lag_s": "s",
     "fit_percent": "%",
     LIMIT: "rad",
     "slope": "m/s^2 per %",

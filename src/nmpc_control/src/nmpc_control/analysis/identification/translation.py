@@ -3,7 +3,9 @@
 
 Over a window, the change of velocity is the integral of thrust along the body's z axis, of drag and
 of gravity. Nothing is differentiated: the same mean is taken on both sides, so that a window costs
-resolution in time but no bias, and dead times can be told finer than the samples.
+resolution in time but no bias, and dead times can be told finer than the samples. Velocity between
+two samples is interpolated, which smooths it, and its model is smoothed alike: else thrust would
+seem to have a lag of half the time between samples.
 """
 
 from dataclasses import dataclass
@@ -14,7 +16,7 @@ import numpy as np
 
 from nmpc_control.analysis.identification.log import SILENCE
 from nmpc_control.analysis.identification.passages import Stretch
-from nmpc_control.analysis.identification.response import LONGEST_DEAD_TIME, held_mean
+from nmpc_control.analysis.identification.response import LONGEST_DEAD_TIME, lagged_mean
 from nmpc_control.analysis.record import Series
 from nmpc_control.analysis.windows import runs
 
@@ -34,6 +36,7 @@ class Motion:
     heading: np.ndarray  # (m + 1, 2) cosine and sine of yaw
     thrust: Series  # (c, 1) [percent] commanded
     number: int  # of the stretch
+    sampled: np.ndarray  # (s,) [s] samples of the velocity, and both ends of the grid
     battery: Optional[Series] = None  # (n, 1) [percent]
 
     @cached_property
@@ -61,14 +64,16 @@ class Motion:
         """Velocity (m, 3) [m/s], mean in each interval of the grid."""
         return 0.5 * (self.velocity[1:] + self.velocity[:-1])
 
-    def percent(self, dead_time: float) -> np.ndarray:
-        """Return the thrust (m,) [percent] in effect a dead time [s] after its command."""
-        return held_mean(self.thrust.times, self.thrust.values, self.grid - dead_time)[:, 0]
+    def percent(self, dead_time: float, lag: float = 0.0) -> np.ndarray:
+        """Return the thrust (m,) [percent] a dead time [s] after its command, behind a lag [s]."""
+        given = self.thrust
+        return lagged_mean(given.times, given.values[:, 0], self.grid - dead_time, lag)
 
     def mean(self, values: np.ndarray) -> np.ndarray:
-        """Return the means (w, ...) of values (m, ...) over each window."""
+        """Return the means (w, ...) of values (m, ...) over each window, as velocity has them."""
         zero = np.zeros((1, *values.shape[1:]))
         total = np.concatenate([zero, np.cumsum(values, axis=0)])
+        total = _between(self.grid, self.sampled, _between(self.sampled, self.grid, total))
         return ((total[_STEPS:] - total[:-_STEPS]) / _STEPS)[::_STEP]
 
     @property
@@ -89,17 +94,20 @@ def motions(stretches: Sequence[Stretch], start: float, end: float) -> List[Moti
     found = []
     for number, (log, begin, finish) in enumerate(parts):
         first, last = max(begin, start) + LONGEST_DEAD_TIME, min(finish, end)
-        if last - first < 2.0 * WINDOW:
+        sampled = log.velocity.between(first, last).times
+        if not len(sampled) or last - sampled[0] < 2.0 * WINDOW:
             continue
         thrust = Series(log.commands.times, log.commands.values[:, :1])
         given = thrust.between(begin, last)
         given.times[0] = begin  # the newest command before holds, and is of the same run
+        first = sampled[0]
         grid = first + _GRID * np.arange(int((last - first) / _GRID) + 1)
         yaw = log.attitude.at(grid)[:, 2]
         heading = np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
         velocity = log.velocity.at(grid)
         attitude = log.attitude
-        found.append(Motion(grid, attitude, velocity, heading, given, number, log.battery))
+        sampled = np.append(sampled[sampled < grid[-1]], grid[-1])
+        found.append(Motion(grid, attitude, velocity, heading, given, number, sampled, log.battery))
     return found
 
 
@@ -116,6 +124,14 @@ def _known(stretch: Stretch) -> List[Stretch]:
     inside = (times >= log.velocity.times[0]) & (times <= log.velocity.times[-1])
     is_known = np.isfinite(thrust) & (gap < SILENCE) & inside
     return [Stretch(log, *period) for period in runs(times, is_known)]
+
+
+def _between(at: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return values (n, ...) at other times (k,) [s] than their own (n,), along straight lines."""
+    index = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    share = (at - times[index]) / (times[index + 1] - times[index])
+    share = share.reshape(-1, *[1] * (values.ndim - 1))
+    return values[index] + share * (values[index + 1] - values[index])
 
 
 def _body_z(rpy: np.ndarray) -> np.ndarray:

@@ -82,8 +82,9 @@ def _delay_of(found: Identification, base: Vehicle) -> float:
 
 def _delay(found: Identification, base: Vehicle) -> Line:
     where = f"not identified: of {base.name}" if found.attitude.lags is None else "of that fit"
-    thrust = found.thrust.estimate.values["dead_time_s"]
+    thrust, lag = (found.thrust.estimate.values[name] for name in ("dead_time_s", "lag_s"))
     other = "" if thrust is None else f"; thrust alone {thrust:.3f}"
+    other += "" if thrust is None or lag is None else f" and a lag of {lag:.3f}, not modelled"
     return f"delay: {_delay_of(found, base):.4g}", f"[s] dead time, {where}{other}"
 
 
