@@ -2,6 +2,7 @@
 """The simulator's own parameters come back from its flights, and intervals hold what they say."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ from nmpc_control.analysis.identification.identify import identify
 from nmpc_control.analysis.identification.passages import Stretch
 from nmpc_control.analysis.identification.thrust import identify_thrust
 from nmpc_control.analysis.identification.translation import motions
+from nmpc_control.analysis.identification.vehicle_file import vehicle_yaml
 from nmpc_control.analysis.record import Series
+from nmpc_control.params import load_vehicle
 from uav_sim.preset import load_preset
 
 TOLERANCE = 0.03
@@ -78,6 +81,9 @@ def test_thrust_and_drag(document):
     delay = preset.delay.thrust + preset.delay.telemetry
     assert thrust["dead_time_s"] == pytest.approx(delay, abs=DEAD_TIME)
     assert thrust["r2"] > 0.99
+    assert thrust["lag_s"] is None
+    assert "without a lag" in thrust["reason"]
+    close(thrust["offset"], preset.thrust.offset, 0.001)  # velocity's interpolation is modelled
     for name, true in zip(("forward", "sideways", "vertical"), "xyz"):
         close(drag[name], getattr(preset.drag, true))
 
@@ -96,6 +102,43 @@ def test_plant_of_first_order():
     close(found.thrust.map.slope, preset.thrust.slope)
     close(found.thrust.map.offset, preset.thrust.offset)
     close(found.drag.estimate.values["forward"], preset.drag.x)
+    close(found.thrust.vertical_drag.values["vertical"], preset.drag.z)
+    thrust = found.thrust.estimate
+    close(thrust.values["lag_s"], preset.rotor_time_constant)
+    assert thrust.values["dead_time_s"] == pytest.approx(0.0, abs=DEAD_TIME)
+    low, high = thrust.confidence["lag_s"]
+    assert 0.0 < low <= thrust.values["lag_s"] <= high
+    text, _ = vehicle_yaml(found, "own", load_vehicle("eth"), None)
+    assert "a lag of 0.050" in text
+
+
+def thrust_of(log, end):
+    return identify_thrust(motions([Stretch(log, 0.0, end)], -np.inf, np.inf))
+
+
+def test_plant_without_lag_or_dead_time():
+    preset = load_preset("paper")
+    thrust = thrust_of(fly(preset, 10.0, excite(10.0, hover=40.0)).log(), 10.0)
+    close(thrust.map.slope, preset.thrust.slope)
+    close(thrust.estimate.values["hover_percent"], preset.hover_percent)
+    close(thrust.map.vertical_drag, preset.drag.z)
+    assert thrust.map.offset == pytest.approx(0.0, abs=TOLERANCE)
+    assert thrust.estimate.values["lag_s"] is None
+    assert thrust.estimate.values["dead_time_s"] == pytest.approx(0.0, abs=DEAD_TIME)
+
+
+def test_lag_and_dead_time_are_told_apart_and_with_noise_their_sum_is():
+    preset = replace(load_preset("dji_hil"), rotor_time_constant=0.05)
+    recorded = fly(preset, 20.0, excite(20.0, hover=45.0))
+    dead_time = preset.delay.thrust + preset.delay.telemetry
+    thrust = thrust_of(recorded.log(), 20.0)
+    close(thrust.estimate.values["lag_s"], 0.05)
+    assert thrust.estimate.values["dead_time_s"] == pytest.approx(dead_time, abs=DEAD_TIME)
+    close(thrust.map.slope, preset.thrust.slope)
+    close(thrust.map.offset, preset.thrust.offset)
+    for seed in range(3):
+        late = thrust_of(noisy(recorded, seed), 20.0).map.late
+        assert sum(late) == pytest.approx(dead_time + 0.05, abs=DEAD_TIME)
 
 
 def noisy(recorded, seed):
@@ -122,6 +165,11 @@ def test_noise_widens_the_intervals_and_is_itself_identified(hil):
             low, high = estimate.confidence[name]
             assert 0.0005 < (high - low) / estimate.values[name] < 0.1
     close(found.thrust.map.slope, preset.thrust.slope)
+    thrust = found.thrust.estimate
+    assert (thrust.values["lag_s"], thrust.confidence["lag_s"]) == (None, None)
+    assert "cannot be told apart" in thrust.reason
+    delay = preset.delay.thrust + preset.delay.telemetry
+    assert thrust.values["dead_time_s"] == pytest.approx(delay, abs=DEAD_TIME)
     assert found.noise["attitude"][0] == pytest.approx(0.01, rel=0.1)
     assert found.noise["velocity"][0] == pytest.approx(0.05, rel=0.1)
 

@@ -20,6 +20,7 @@ from nmpc_control.analysis.identification.response import (
     LONGEST_DEAD_TIME,
     SECOND,
     held_mean,
+    lagged_mean,
     respond,
 )
 from nmpc_control.analysis.identification.robust import r_squared, trimmed_least_squares
@@ -69,6 +70,25 @@ def test_held_mean_equals_brute_force(steps, seed):
         fine = a + (np.arange(4000) + 0.5) / 4000 * (b - a)
         held = values[np.searchsorted(times, fine, side="right") - 1]
         assert row == pytest.approx(held.mean(axis=0), abs=2e-2)
+
+
+@given(
+    st.lists(st.floats(0.001, 0.05), min_size=2, max_size=20),
+    st.floats(0.005, 0.2),
+    st.integers(0, 100),
+)
+@settings(max_examples=25, deadline=None)
+def test_lagged_mean_equals_a_fine_simulation(steps, lag, seed):
+    times = np.concatenate([[0.0], np.cumsum(np.maximum(1, np.round(np.array(steps) / 1e-3)))])
+    values = np.random.default_rng(seed).normal(size=len(times))
+    fine = 1e-5 * np.arange(round(times[-1] * 100) + 2001)  # commands on it: held is exact
+    times *= 1e-3
+    held = values[np.searchsorted(times, fine + 1e-9, side="right") - 1]
+    lagged = held[0] + lsim(([1.0], [lag, 1.0]), held - held[0], fine, interp=False)[1]
+    area = np.concatenate([[0.0], np.cumsum(0.5e-5 * (lagged[1:] + lagged[:-1]))])
+    grid = np.linspace(0.0, fine[-1], 12)
+    expected = np.diff(np.interp(grid, fine, area)) / np.diff(grid)
+    assert lagged_mean(times, values, grid, lag) == pytest.approx(expected, abs=1e-4)
 
 
 def passage(gain, omega, zeta, dead_time, limit, seed=0):
