@@ -43,18 +43,61 @@ def test_a_state_or_input_that_is_not_finite_is_answered_without_a_plan(nmpc, ar
     assert again.found, "the next solve is clean"
 
 
+def test_what_follows_an_input_that_is_not_finite_is_as_if_it_had_not_been(nmpc):
+    """No NaN stays behind in a solver's buffers."""
+    nmpc.reset()
+    expected = nmpc.solve(0.0, START, straight_reference(nmpc), hover_input()).cost
+    nmpc.solve(0.0, START, straight_reference(nmpc), hover_input() * np.nan)
+    nmpc.reset()
+    again = nmpc.solve(0.0, START, straight_reference(nmpc), hover_input()).cost
+    assert again == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("free", [("R", 0), ("R", 3)], ids=["thrust", "yaw rate"])
+def test_inputs_that_cost_nothing_are_solved_all_the_same(free):
+    """Without any weight on an input the recursion is singular, the problem is not."""
+    name, index = free
+    p = parameters("compiled", max_iterations=100, time_budget=2.0)
+    weights = {"Q_f": np.zeros(10)}
+    for part in (name, "R_delta"):
+        weights[part] = getattr(p.weights, part).copy()
+        weights[part][index] = 0.0
+    nmpc = Nmpc(replaced(p, "weights", **weights))
+    plan = nmpc.solve(0.0, START, np.tile(START, (61, 1)), hover_input())
+    assert plan.status == "converged"
+    assert plan.cost == pytest.approx(0.0, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("spoil", "named"),
     [
         (lambda ref: ref * np.nan, "not finite"),
         (lambda ref: ref[:5], "shape"),
         (lambda ref: ref[:, :9], "shape"),
+        (lambda ref: ref[0], "shape"),
     ],
-    ids=["NaN", "short", "narrow"],
+    ids=["NaN", "short", "narrow", "flat"],
 )
-def test_a_reference_that_cannot_be_meant_is_refused_by_name(nmpc, spoil, named):
+@pytest.mark.parametrize("obstacles", [(), (SPHERE,)], ids=["free", "obstacle"])
+def test_a_reference_that_cannot_be_meant_is_refused_by_name(nmpc, spoil, named, obstacles):
     with pytest.raises(ProblemError, match=named):
-        nmpc.solve(0.0, START, spoil(straight_reference(nmpc)), hover_input())
+        nmpc.solve(0.0, START, spoil(straight_reference(nmpc)), hover_input(), obstacles)
+
+
+def test_an_input_before_that_is_far_outside_its_bounds_is_led_back(nmpc):
+    before = np.array([40.0, 1.0, -1.0, 3.0])
+    nmpc.reset()
+    plan = nmpc.solve(0.0, START, straight_reference(nmpc), before)
+    assert plan.found
+    assert np.all(plan.inputs <= nmpc.parameters.limits.input_max + 1e-6)
+    nmpc.reset()
+
+
+def test_obstacles_without_a_slot_are_told():
+    nmpc = Nmpc(replaced(parameters("compiled"), "solver", obstacle_slots=0))
+    plan = nmpc.solve(0.0, START, straight_reference(nmpc), hover_input(), (SPHERE,))
+    assert "1 obstacles in reach have no slot" in plan.status
+    assert nmpc.solve(0.1, START, straight_reference(nmpc), hover_input()).status == "converged"
 
 
 @pytest.mark.parametrize(
@@ -124,7 +167,8 @@ def test_an_obstacle_that_is_nowhere_is_a_status_not_an_exception(controller, va
     controller.obstacles = (Obstacle("lost", np.full(3, value), np.array([0.5])),)
     step = tick(controller, t)
     assert not step.plan.found
-    assert "not finite" in step.plan.status
+    assert "lost" in step.plan.status
+    assert "finite" in step.plan.status
     assert is_finite(step.plan)
     controller.obstacles = ()
     assert tick(controller, t + 0.05).plan.found

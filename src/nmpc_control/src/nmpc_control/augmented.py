@@ -17,9 +17,10 @@ import casadi as ca
 from nmpc_control import constraints
 from nmpc_control.ocp import Structure, Symbols, tracking_residuals
 
-# what ``settle`` adds up: penalties with the new multipliers, L1 penalties; and what it takes the
+# what ``settle`` adds up: penalties with the new multipliers, L1 penalties, and what these exceed
+# the new multipliers' forces by, never negative and zero at the solution; and what it takes the
 # largest of: move of a multiplier as an excess, violations
-SUMS = ("updated", "exact")
+SUMS = ("updated", "exact", "gap")
 MAXIMA = ("moved", constraints.SPEED, constraints.FENCE, constraints.OBSTACLE)
 
 
@@ -33,7 +34,7 @@ def penalty(g: ca.SX, multipliers: ca.SX, inverse_mu: ca.SX, rho: ca.SX) -> ca.S
 class Settled(NamedTuple):
     """What the outer iteration makes of some inequalities."""
 
-    sums: ca.SX  # (2,) see SUMS
+    sums: ca.SX  # (3,) see SUMS
     moved: ca.SX  # largest move of a multiplier, as an excess
     multipliers: ca.SX  # (n,) the new ones
 
@@ -43,7 +44,8 @@ def settled(g: ca.SX, multipliers: ca.SX, inverse_mu: ca.SX, rho: ca.SX) -> Sett
     new = ca.fmin(ca.fmax(0, multipliers + g / inverse_mu), rho)
     updated, exact = penalty(g, new, inverse_mu, rho), rho * ca.fmax(0, g)
     moved = ca.mmax(ca.fabs(new - multipliers) * inverse_mu)
-    return Settled(ca.vertcat(ca.sum1(updated), ca.sum1(exact)), moved, new)
+    sums = ca.vertcat(ca.sum1(updated), ca.sum1(exact), ca.sum1(exact - new * g))
+    return Settled(sums, moved, new)
 
 
 def derivatives(
@@ -82,7 +84,7 @@ def stage_cost(s: Symbols, terminal: bool) -> ca.SX:
 
 
 def settle_pilot_bounds(structure: Structure) -> ca.Function:
-    """Return (x, theta, multipliers) -> sums (2,), maxima (4,), new multipliers (7,)."""
+    """Return (x, theta, multipliers) -> sums (3,), maxima (4,), new multipliers (7,)."""
     s = Symbols(structure)
     bounds = _pilot_bounds(s)
     result, g = settled(*bounds), bounds[0]

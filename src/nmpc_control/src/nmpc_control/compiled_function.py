@@ -49,15 +49,20 @@ def compile_functions(
             "no C compiler %r: solving with CasADi's interpreter, about ten times slower", compiler
         )
         return interpreted
-    try:
-        library = _library(functions, program)
-    except (OSError, subprocess.CalledProcessError) as error:
-        detail = getattr(error, "stderr", "") or str(error)
-        LOGGER.warning(
-            "compilation failed, solving with CasADi's interpreter: %s", detail.strip()[-500:]
-        )
-        return interpreted
-    return {name: ca.external(name, str(library)) for name in interpreted}
+    for _ in range(2):
+        try:
+            library = _library(functions, program)
+            return {name: ca.external(name, str(library)) for name in interpreted}
+        except (OSError, subprocess.CalledProcessError) as error:
+            detail = getattr(error, "stderr", "") or str(error)
+            break
+        except RuntimeError as error:  # a file that the power went off under
+            detail = str(error)
+            library.unlink()
+    LOGGER.warning(
+        "compilation failed, solving with CasADi's interpreter: %s", detail.strip()[-500:]
+    )
+    return interpreted
 
 
 def _library(functions: Sequence[ca.Function], program: str) -> Path:
@@ -83,6 +88,8 @@ def _library(functions: Sequence[ca.Function], program: str) -> Path:
             capture_output=True,
             text=True,
         )
+        with open(product, "rb") as written:
+            os.fsync(written.fileno())
         os.replace(product, library)  # atomic: another process may be doing the same
     return library
 

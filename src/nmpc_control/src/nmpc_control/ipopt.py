@@ -92,6 +92,11 @@ class IpoptSolver:
         lower[slacks:] = 0.0
         softened_rows = solver.size1_in("lbg") - N * (NX + NU)
         largest_steps = np.tile(self.structure.dt * instance.theta[PARTS["input_rate"]], N)
+        least_changes, greatest_changes = -largest_steps, largest_steps.copy()
+        # from an input outside its bounds, the way back may be longer than the rate allows
+        back = instance.input_max - instance.u_before, instance.input_min - instance.u_before
+        least_changes[:NU] = np.minimum(least_changes[:NU], back[0])
+        greatest_changes[:NU] = np.maximum(greatest_changes[:NU], back[1])
         parameters = np.concatenate(
             [instance.u_before, instance.theta, instance.stages.ravel(order="F")]
         )
@@ -99,8 +104,8 @@ class IpoptSolver:
             x0=np.concatenate([guess.states.ravel(), guess.inputs.ravel(), np.zeros(count)]),
             lbx=lower,
             ubx=upper,
-            lbg=np.concatenate([np.zeros(N * NX), -largest_steps, np.full(softened_rows, -np.inf)]),
-            ubg=np.concatenate([np.zeros(N * NX), largest_steps, np.zeros(softened_rows)]),
+            lbg=np.concatenate([np.zeros(N * NX), least_changes, np.full(softened_rows, -np.inf)]),
+            ubg=np.concatenate([np.zeros(N * NX), greatest_changes, np.zeros(softened_rows)]),
             p=parameters,
         )
         stats = solver.stats()
@@ -111,7 +116,8 @@ class IpoptSolver:
         multipliers = np.asarray(result["lam_x"]).ravel()[free_states:slacks]
         g = np.asarray(result["g"]).ravel()
         defect = float(np.max(np.abs(g[: N * NX])))
-        too_fast = float(np.max(np.abs(g[N * NX : N * (NX + NU)]) - largest_steps))
+        changes = g[N * NX : N * (NX + NU)]
+        too_fast = float(np.max(np.maximum(changes - greatest_changes, least_changes - changes)))
         violation, softened = worst_violation(z[slacks:].reshape(N + 1, -1), kinds, _SHOWN)
         status = str(stats["return_status"])
         return Solution(

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: MIT
 """What one Newton step says, which model the next one is taken from, and what is left to gain."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 _NEWTON_REGION = 0.02  # relative change of the cost below which the exact Hessian is tried
 _DAMPING_FIRST, _DAMPING_FACTOR, _DAMPING_LAST = 1e-2, 10.0, 1e6
-# a full step is trusted to leave at best this part of what it promised: by the exact Hessian with
-# the same active bounds, with others, by Gauss-Newton
-_LEFT_SAME, _LEFT_CHANGED, _LEFT_GAUSS_NEWTON = 1e-3, 5e-2, 0.5
+# a full step is trusted to leave at best this part of what it promised: by the exact Hessian, by
+# Gauss-Newton, of which the promise is doubted by a factor, too, as it sees too much curvature
+_LEFT_EXACT, _LEFT_GAUSS_NEWTON, _DOUBT = 1e-3, 0.5, 20.0
 
 
 class Step(NamedTuple):
@@ -20,6 +21,11 @@ class Step(NamedTuple):
     active: int  # inputs on a bound
     changed: bool  # whether the step takes inputs to a bound or away from one
     exact: bool = False  # whether the model has the exact Hessian
+
+    @property
+    def to_gain(self) -> float:
+        """By how much the cost may fall from here."""
+        return self.promise * (1.0 if self.exact else _DOUBT)
 
 
 @dataclass
@@ -60,8 +66,10 @@ def left_to_gain(step: Step, decrease: float) -> float:
     What the model missed, ``promise - decrease``, is a term of third order T d^3 / 6; the gradient
     that the step leaves is T d^2 / 2, and a Newton step on that lowers the cost by half its square
     over the curvature. With d^2 times curvature = 2 promise, this is (9 / 4) missed^2 / promise.
+    Where the active bounds change it says nothing: another sweep must tell.
     """
+    if step.changed:
+        return math.inf
     missed = abs(step.promise - decrease)
-    part = _LEFT_CHANGED if step.changed else _LEFT_SAME
-    least = (part if step.exact else _LEFT_GAUSS_NEWTON) * step.promise
+    least = (_LEFT_EXACT if step.exact else _LEFT_GAUSS_NEWTON * _DOUBT) * step.promise
     return max(9.0 / 4.0 * missed**2 / max(step.promise, 1e-300), least)

@@ -78,7 +78,7 @@ class Nmpc:
         Raises:
             ProblemError: a wrong shape; a time, reference or obstacle that is not finite.
         """
-        check_arguments(t, x0, u_before, u_ref, self.structure.horizon)
+        check_arguments(t, x0, x_ref, u_before, u_ref, self.structure.horizon)
         guess = self._guess(t)
         slots = self._slots(t, obstacles, x_ref[:, :3] if guess is None else guess.states[:, :3])
         stages = pack_stages(
@@ -107,6 +107,8 @@ class Nmpc:
         """Return which softened bound the plan exceeds, or into which margin it begins; or ""."""
         if solution.softened:
             return f", {solution.softened} exceeded by {solution.violation:.2f}"
+        if self._obstacle_slots.left_out:
+            return f", {self._obstacle_slots.left_out} obstacles in reach have no slot"
         avoidance = self.parameters.avoidance
         inside = -clearance(slots[:, 0], x0[:3]).min(initial=np.inf) - avoidance.inflation
         if avoidance.term == "potential" and inside > 0.0:

@@ -91,12 +91,21 @@ def _check_numbers(
 
 
 def check_arguments(
-    t: float, x0: np.ndarray, u_before: np.ndarray, u_ref: Optional[np.ndarray], horizon: int
+    t: float,
+    x0: np.ndarray,
+    x_ref: np.ndarray,
+    u_before: np.ndarray,
+    u_ref: Optional[np.ndarray],
+    horizon: int,
 ) -> None:
     """Raise ProblemError on a time that is not finite or an argument of wrong shape."""
     if not np.isfinite(t):
         raise ProblemError(f"time: got {t}, expected a finite one")
-    shapes = {"x0": (x0, [(NX,)]), "u_before": (u_before, [(NU,)])}
+    shapes = {
+        "x0": (x0, [(NX,)]),
+        "x_ref": (x_ref, [(horizon + 1, NX)]),
+        "u_before": (u_before, [(NU,)]),
+    }
     if u_ref is not None:
         shapes["u_ref"] = (u_ref, [(NU,), (horizon, NU)])
     for name, (value, expected) in shapes.items():

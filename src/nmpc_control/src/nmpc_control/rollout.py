@@ -66,7 +66,7 @@ def forward(structure: Structure) -> ca.Function:
 def settle(structure: Structure) -> ca.Function:
     """Return the function ``settle``: the outer iteration's view of a rollout.
 
-    (X (10, N+1), stages, theta, multipliers) -> sums (2,), maxima (4,) (``augmented.SUMS``,
+    (X (10, N+1), stages, theta, multipliers) -> sums (3,), maxima (4,) (``augmented.SUMS``,
     ``augmented.MAXIMA``), multipliers_new (nc, N+1).
     """
     N = structure.horizon

@@ -5,6 +5,7 @@ from typing import List, Optional, Sequence
 
 import numpy as np
 
+from nmpc_control.errors import ProblemError
 from nmpc_control.ocp import SLOT_SIZE
 from nmpc_control.state import Obstacle
 
@@ -14,6 +15,7 @@ class Slots:
 
     def __init__(self) -> None:
         self._obstacles: Optional[Sequence[Obstacle]] = None
+        self.left_out = 0  # obstacles in reach of the path that found no slot
 
     def fill(
         self,
@@ -31,9 +33,13 @@ class Slots:
             path: (N + 1, 3) [m] where the aircraft is expected at them.
             margin: [m] least distance from an obstacle's surface.
             count: number of slots.
+
+        Raises:
+            ProblemError: an obstacle that is nowhere or has no size.
         """
-        if obstacles is not self._obstacles:
+        if obstacles is not self._obstacles or not isinstance(obstacles, tuple):
             self._convert(obstacles)
+        self.left_out = 0
         if not len(obstacles):
             return np.empty((0, len(times), SLOT_SIZE))
         age = times - self._stamp[:, None]
@@ -41,7 +47,9 @@ class Slots:
         offset = path - centres
         offset[..., 2] *= self._vertical[:, None]
         nearest = np.sqrt(np.einsum("ijk,ijk->ij", offset, offset).min(axis=1)) - self._radius
-        chosen = np.argsort(nearest, kind="stable")[:count]
+        order = np.argsort(nearest, kind="stable")
+        chosen = order[:count]
+        self.left_out = int(np.sum(nearest[order[count:]] < margin))
         data = np.empty((len(chosen), len(times), SLOT_SIZE))
         data[..., :3] = centres[chosen]
         data[..., 3] = self._vertical[chosen, None]
@@ -49,6 +57,14 @@ class Slots:
         return data
 
     def _convert(self, obstacles: Sequence[Obstacle]) -> None:
+        self._obstacles = None
+        for o in obstacles:
+            numbers = np.concatenate([o.position, o.velocity, o.size])
+            if not np.all(np.isfinite(numbers)) or not np.all(np.asarray(o.size) > 0.0):
+                raise ProblemError(
+                    f"obstacle {o.id}: got position {o.position}, velocity {o.velocity}, size "
+                    f"{o.size}, expected numbers that are finite, and a size of more than 0"
+                )
         self._obstacles = obstacles
         moving = [o.stamp is not None for o in obstacles]
         zero = np.zeros(3)

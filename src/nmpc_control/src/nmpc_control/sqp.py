@@ -15,7 +15,7 @@ from typing import Dict, List, Optional, Tuple
 import casadi as ca
 import numpy as np
 
-from nmpc_control.augmented import MAXIMA
+from nmpc_control.augmented import MAXIMA, SUMS
 from nmpc_control.compiled_function import Buffered, compile_functions
 from nmpc_control.newton_step import Step, StepModel, left_to_gain
 from nmpc_control.ocp import PARTS, Instance, Structure
@@ -28,8 +28,9 @@ _ARMIJO = 1e-4
 _LEAST_PIVOT = 1e-6
 _SHORTEST_STEP = 1.0 / 64.0
 _LESS, _MORE = 0.5, 1.3  # times its promise: what a step brings so that another length is tried
-_EXCESS = 0.1  # [m], [m/s] times the root of the tolerance: a bound may be exceeded by this
+_LEAST_DAMPING = 1e-8  # keeps the recursion regular where inputs cost nothing
 _FIRST_ACCURACY = 1e-3  # relative decrease below which the multipliers are first updated
+_NO_EXCESS = 1e-6  # [m], [m/s] a smaller move of the multipliers, as an excess, is none
 _SLOW = 0.25  # of the last move of the multipliers: if one is larger, the bounds get stiffer
 _STIFFER, _STIFFEST = 5.0, 1e4
 _ROUNDING = 1e-10  # a smaller promise, relative, is rounding
@@ -82,7 +83,7 @@ class SqpSolver:
         a["stages"][:], a["theta"][:, 0] = instance.stages, instance.theta
         self._alpha = 1.0
         cost, model = self._begin(instance, guess)
-        accuracy, excess, before = _FIRST_ACCURACY, _EXCESS * self.tolerance**0.5, np.inf
+        accuracy, before = _FIRST_ACCURACY, np.inf
         iterations, status, step = 0, "budget", Step(np.inf, -np.inf, np.inf, 0, False)
         while np.isfinite(cost):
             late = time.perf_counter() - start > self.time_budget
@@ -90,7 +91,13 @@ class SqpSolver:
                 break
             step = self._direction(model)
             scale = 1.0 + self._tracking
-            left, stationary = step.promise / scale, step.residual <= self.tolerance
+            if not np.isfinite(step.promise):
+                if model.exhausted:
+                    status = "stalled"
+                    break
+                model.failed()
+                continue
+            left, stationary = step.to_gain / scale, step.residual <= self.tolerance
             if left > self.tolerance and not stationary:
                 iterations += 1
                 new_cost, alpha = self._search(cost, step)
@@ -105,13 +112,13 @@ class SqpSolver:
                 model.succeeded((cost - new_cost) / scale)
                 cost = new_cost
             if left <= accuracy or stationary:
-                moved, cost = self._update_multipliers(cost)
-                if moved <= excess and (left <= self.tolerance or stationary):
+                gap, moved, cost = self._update_multipliers(cost)
+                is_exact = gap <= self.tolerance * scale or moved <= _NO_EXCESS
+                if is_exact and (left <= self.tolerance or stationary):
                     status = "converged"
                     break
-                tighter = 0.0 if moved <= excess else accuracy / 10.0
-                accuracy = max(self.tolerance, tighter)
-                if moved > max(excess, _SLOW * before):
+                accuracy = max(self.tolerance, 0.0 if is_exact else accuracy / 10.0)
+                if not is_exact and moved > _SLOW * before:
                     cost = self._stiffen()
                 before = moved
         if not np.isfinite(cost):
@@ -174,6 +181,7 @@ class SqpSolver:
         """Set the iterate that the sweeps start from."""
         a = self._arrays
         a["X"][:], a["U"][:] = states.T, inputs.T
+        a["step"][:] = 0.0
         a["gains"][:] = 0.0 if gains is None else gains.reshape(-1, NU).T
         a["multipliers"][:] = 0.0 if multipliers is None else multipliers.T
         self._forced = multipliers is not None and bool(multipliers.any())
@@ -190,7 +198,7 @@ class SqpSolver:
 
     def _direction(self, model: StepModel) -> Step:
         """Compute step and gains, by the exact Hessian if that is wanted and positive."""
-        self._arrays["damping"][0, 0] = model.damping
+        self._arrays["damping"][0, 0] = max(model.damping, _LEAST_DAMPING)
         self._arrays["clamping"][0, 0] = 1.0
         if model.newton:
             self._backward_exact()
@@ -256,19 +264,21 @@ class SqpSolver:
         """Whether no softened bound is felt at the iterate."""
         return self._penalties == 0.0 and not self._forced
 
-    def _update_multipliers(self, cost: float) -> Tuple[float, float]:
+    def _update_multipliers(self, cost: float) -> Tuple[float, float, float]:
         """Move the multipliers by the inequalities at the iterate.
 
-        Returns the largest move, as an excess, and the cost with the new ones.
+        Returns by how much the L1 penalty exceeds what the new ones make of it, the largest move,
+        as an excess, and the cost with the new ones.
         """
         if self._quiet:
-            return 0.0, cost
+            return 0.0, 0.0, cost
         a = self._arrays
         self._settle()
         a["multipliers"][:] = a["multipliers_new"]
         self._forced = bool(a["multipliers"].any())
         self._penalties = float(a["sums"][0, 0])
-        return float(a["maxima"][0, 0]), self._tracking + self._penalties
+        gap = float(a["sums"][SUMS.index("gap"), 0])
+        return gap, float(a["maxima"][0, 0]), self._tracking + self._penalties
 
     def _stiffen(self) -> float:
         """Raise the curvatures of the augmented Lagrangian; return the cost with them."""

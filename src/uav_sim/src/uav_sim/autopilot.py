@@ -81,7 +81,7 @@ class Autopilot:
 
     @property
     def height(self) -> float:
-        """Height above the take-off spot [m]."""
+        """Height above the take-off spot [m], as taken when it took off."""
         return self._plant.position[2] - self._home[2]
 
     def take_events(self) -> List[str]:
@@ -221,10 +221,11 @@ class Autopilot:
     def _stand(self, t: float) -> None:
         """On the ground: motors off, idle, or after a setpoint where that is allowed."""
         if self._setpoint_time is not None:
-            self._plant.command(*self._guidance.follow(self._home[2]))
-            if not self._plant.on_ground:
-                self._home = (*self._plant.position[:2], 0.0)
+            if self._plant.on_ground:
+                self._home = self._plant.position
+            else:
                 self.phase = Phase.FLYING
+            self._plant.command(*self._guidance.follow(self._home[2]))
             return
         self._plant.command(0.0, 0.0, 0.0, 0.0)
         self._obey_pilot(t)

@@ -10,7 +10,9 @@ from typing import Optional, Tuple
 
 from uav_sim.plant import Plant, limit_norm
 
-INTEGRATION_BAND = 1.0  # [m/s] integrals rest while the velocity error is larger, as when braking
+# [m/s] integrals rest while the velocity error is larger, as when braking from a fast flight; a
+# steady wind of 14 m/s stays within it
+INTEGRATION_BAND = 3.0
 
 
 def _clamp(value: float, bound: float) -> float:

@@ -2,7 +2,7 @@
 """A simulated M100 as seen through dji_sdk, without ROS: setpoints and requests in, packets out."""
 
 import math
-from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, TypeVar
 
 import numpy as np
 
@@ -18,12 +18,13 @@ from uav_sim.plant import Plant, Vector
 from uav_sim.preset import PACKET_PERIOD, PlantPreset
 from uav_sim.remote_control import RemoteControl
 from uav_sim.sensors import Sensors
-from uav_sim.setpoint import decode
+from uav_sim.setpoint import Setpoint, decode
 from uav_sim.telemetry import Packet, Telemetry, body_rates
 from uav_sim.vicon import Vicon, ViconPose
 from uav_sim.wind import Wind
 from uav_sim.world import Collision, World
 
+T = TypeVar("T")
 DRAIN_PERIOD = 0.1  # [s] the battery is looked after as often as it is reported
 
 
@@ -76,7 +77,7 @@ class SimulatedM100:
         self._wind: Optional[Wind] = None
         self._commands: Optional[Channel] = None
         self._vicon: Optional[Vicon] = None
-        self._navigation: Optional[Sensors] = None  # of a position that drifts
+        self._navigation: Optional[Sensors] = None  # where the flight controller is off its place
         if disturbance is not None:
             self._disturb(disturbance)
 
@@ -94,7 +95,7 @@ class SimulatedM100:
         clearances are counted anew.
         """
         self.plant.place(position, velocity, yaw, airborne)
-        self.autopilot.start(self.t, airborne, authority)
+        self._navigate(self.autopilot.start, self.t, airborne, authority)
         self.world.reset()
         if airborne:
             self._telemetry.refer_to_home(self.t)
@@ -107,11 +108,11 @@ class SimulatedM100:
             plant.wind = self._wind.advance(plant.position[2], plant.velocity)
         if self._commands is not None:
             arrived = self._commands.receive(self.t)
-            self.late_receipts = [self.autopilot.setpoint(self.t, s) for s in arrived]
+            self.late_receipts = [self._accept(setpoint) for setpoint in arrived]
         if self._navigation is None:
             self.autopilot.update(self.t)
         else:
-            self._navigate(self._navigation.drift)
+            self._navigate(self.autopilot.update, self.t)
         plant.step()
         self._steps += 1
         self.t = self._steps * self._step
@@ -149,7 +150,7 @@ class SimulatedM100:
         if self._commands is not None:
             self._commands.send(self.t, setpoint)
             return Receipt(True)
-        return self.autopilot.setpoint(self.t, setpoint)
+        return self._accept(setpoint)
 
     def control_authority(self, enable: bool) -> Ack:
         """Obtain or release the control authority."""
@@ -161,7 +162,7 @@ class SimulatedM100:
 
     def task(self, number: int) -> Ack:
         """Start a task: 1 go home, 4 take off, 6 land."""
-        return self._reply(1, 1) or self.autopilot.task(self.t, number)
+        return self._reply(1, 1) or self._navigate(self.autopilot.task, self.t, number)
 
     def set_local_position_reference(self) -> bool:
         """Make the newest GPS position the origin of ``local_position``."""
@@ -241,13 +242,22 @@ class SimulatedM100:
         """Return the reply of a dead node: none; None if it lives."""
         return Ack(False, cmd_set, cmd_id, NO_RESPONSE) if self.faults.dead else None
 
-    def _navigate(self, drift: Vector) -> None:
-        """Have the flight controller act on its own horizontal position, which drifts."""
-        plant = self.plant
+    def _accept(self, setpoint: Setpoint) -> Receipt:
+        if self._navigation is None:
+            return self.autopilot.setpoint(self.t, setpoint)
+        return self._navigate(self.autopilot.setpoint, self.t, setpoint)
+
+    def _navigate(self, act: Callable[..., T], *args: Any) -> T:
+        """Have the flight controller act where it believes to be: GPS and barometer are off."""
+        if self._navigation is None:
+            return act(*args)
+        plant, (ex, ey, ez) = self.plant, self._navigation.belief
         x, y, z = true = plant.position
-        plant.position = (x + drift[0], y + drift[1], z)
-        self.autopilot.update(self.t)
-        plant.position = true
+        plant.position = (x + ex, y + ey, z + ez)
+        try:
+            return act(*args)
+        finally:
+            plant.position = true
 
     def _scan(self, laser: Laser) -> None:
         self.new_scan = None
@@ -264,5 +274,4 @@ class SimulatedM100:
         self._wind = disturbance.wind(self.preset.step)
         self._commands = disturbance.command
         self._vicon = disturbance.vicon
-        if disturbance.parameters.sensors.position.drift > 0.0:
-            self._navigation = disturbance.sensors
+        self._navigation = disturbance.sensors

@@ -2,8 +2,9 @@
 """Errors of what the flight controller reports: position, velocity, attitude, height, IMU.
 
 Interface: ``Sensors(parameters, seed)``; ``inertial`` once per packet (100 Hz), ``navigation`` once
-per packet with the 50 Hz topics. ``drift`` is the slow error of the position now, ``shared_shift``
-that of ``local_position``, which obstacles sensed from the aircraft share.
+per packet with the 50 Hz topics. ``drift`` is the slow error of the position reported now,
+``shared_shift`` that of ``local_position``, which obstacles sensed from the aircraft share, and
+``belief`` that by which the flight controller itself is off: it steers by the barometer's height.
 
 Each error is white noise plus a first-order Gauss-Markov process, begun as after a long time:
 sigma and correlation e^(-t / time_constant).
@@ -39,13 +40,15 @@ class ErrorParameters:
 class SensorParameters:
     """Errors of all quantities."""
 
-    position: ErrorParameters = field()  # [m] of gps_position and local_position
+    position: ErrorParameters = field()  # [m] of gps_position and local_position; z: see below
     velocity: ErrorParameters = field()  # [m/s]
     attitude: ErrorParameters = field()  # [rad] of roll, pitch, yaw
     gyroscope: ErrorParameters = field()  # [rad/s]
     accelerometer: ErrorParameters = field()  # [m/s^2]
     height: ErrorParameters = field()  # [m] of height_above_takeoff
     height_offset: float = field(metadata={"min": 0.0})  # [m] sigma of the barometer's constant
+    # The altitude of gps_position shares the slow error of the height, as it is fused from it.
+    altitude_is_barometric: bool = True
 
     @property
     def is_perfect(self) -> bool:
@@ -93,14 +96,21 @@ class Sensors:
         self._gyroscope = process("gyroscope", _FAST)
         self._accelerometer = process("accelerometer", _FAST)
         self.height_offset = parameters.height_offset * normals(f"{seed}/height_offset")()
+        self._is_barometric = parameters.altitude_is_barometric
         self._reported: Deque[Tuple[Any, Vector]] = deque(maxlen=_REMEMBERED)
         self._error: Vector = STILL
         self._reference_error: Vector = STILL
 
     @property
     def drift(self) -> Vector:
-        """Slow part (3,) [m] of the position's error now."""
-        return self._position.drift
+        """Slow part (3,) [m] of the reported position's error now."""
+        return self.belief if self._is_barometric else self._position.drift
+
+    @property
+    def belief(self) -> Vector:
+        """Error (3,) [m] of what the flight controller takes for its position now."""
+        x, y, _ = self._position.drift
+        return (x, y, self._height.drift[2] + self.height_offset)
 
     @property
     def reference_error(self) -> Vector:
@@ -110,7 +120,7 @@ class Sensors:
     @property
     def shared_shift(self) -> Vector:
         """Slow error (3,) [m] of ``local_position``: of its reference, too."""
-        (x, y, z), (rx, ry, rz) = self._position.drift, self._reference_error
+        (x, y, z), (rx, ry, rz) = self.drift, self._reference_error
         return (x - rx, y - ry, z - rz)
 
     def inertial(
@@ -127,9 +137,11 @@ class Sensors:
         self, position: Vector, velocity: Vector, height: float
     ) -> Tuple[Vector, Vector, float]:
         """Return position [m], velocity [m/s], height above take-off [m] with errors."""
-        self._error = self._position.added(STILL)
-        (x, y, z), (ex, ey, ez) = position, self._error
+        ex, ey, ez = self._position.added(STILL)
         height += self.height_offset + self._height.added(STILL)[2]
+        if self._is_barometric:
+            ez += self.drift[2] - self._position.drift[2]
+        (x, y, z), self._error = position, (ex, ey, ez)
         return (x + ex, y + ey, z + ez), self._velocity.added(velocity), height
 
     def reported(self, place: Any) -> None:
