@@ -11,7 +11,7 @@ from typing import List, Sequence
 import numpy as np
 
 from nmpc_control.nmpc import Nmpc
-from nmpc_control.params import load_parameters, load_weights
+from nmpc_control.params import Parameters, load_parameters, load_weights
 from nmpc_control.scenario import Scenario, load_scenario
 from nmpc_control.state import NX, POSITION, VELOCITY, YAW, YAW_RATE, Obstacle, hover_input
 from uav_sim.closed_loop.bench.problem import Problem, Recorder
@@ -28,6 +28,8 @@ _MOST_SPHERES = 4
 _RADIUS = (0.2, 0.8)  # [m]
 _ASIDE = (1.5, 1.5, 1.0)  # [m] sigma of their distance from the path
 _PASSAGE = 1.2  # [m] least gap between two surfaces
+_BOUNDED = 0.2  # part of the problems with bounds that are felt
+_SPEED, _RATE = (1.2, 3.0), (0.2, 1.0)  # [m/s] limit; part of the usual input rate
 _PERIOD = 0.05  # [s] since the solve that a warm start comes from
 
 
@@ -41,11 +43,23 @@ def random_problems(seed: int, count: int) -> List[Problem]:
     nmpc = Nmpc(load_parameters(PLANT))
     nmpc.solver = Recorder(exact_solver(nmpc.structure))
     weights = [load_weights(name) for name in _WEIGHTS]
-    result = []
+    usual, result = nmpc.parameters, []
     for i in range(count):
-        nmpc.use(replace(nmpc.parameters, weights=weights[rng.integers(len(weights))]))
+        parameters = replace(usual, weights=weights[rng.integers(len(weights))])
+        nmpc.use(_bounded(rng, parameters) if rng.random() < _BOUNDED else parameters)
         result.append(_draw(rng, scenarios[rng.integers(len(scenarios))], nmpc, warm=i % 2 == 1))
     return result
+
+
+def _bounded(rng: np.random.Generator, parameters: Parameters) -> Parameters:
+    """Return parameters with bounds that will be felt: speed, input rate, for some Eq. 7."""
+    limits = replace(
+        parameters.limits,
+        speed=rng.uniform(*_SPEED),
+        input_rate=parameters.limits.input_rate * rng.uniform(*_RATE),
+    )
+    term = "hard" if rng.random() < 0.5 else parameters.avoidance.term
+    return replace(parameters, limits=limits, avoidance=replace(parameters.avoidance, term=term))
 
 
 def _draw(rng: np.random.Generator, scenario: Scenario, nmpc: Nmpc, warm: bool) -> Problem:
