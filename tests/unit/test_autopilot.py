@@ -253,6 +253,6 @@ def test_direct_lift_off_where_that_is_allowed():
 
 
 def test_flying_into_the_ground_with_low_thrust_counts_as_landed():
-    sim = hovering(position=(0.0, 0.0, 1.0))
-    stream(sim, 2.0, (0.0, 0.0, 25.0, 0.0, 43.0))
+    sim = hovering(position=(0.0, 0.0, 0.6))
+    stream(sim, 2.0, (0.0, 0.0, 27.0, 0.0, 43.0))
     assert sim.autopilot.flight_status == 5 and not sim.plant.motors_on

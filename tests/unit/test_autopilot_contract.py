@@ -184,7 +184,7 @@ def test_a_pilot_takes_off_by_the_sticks_and_a_controller_takes_over(mode):
     assert sim.control_authority(True).result
     stream(sim, 2.0, "ENUvelocity_yawrate", (1.0, 0.0, 0.0, 0.0))
     assert sim.truth.velocity[0] > 0.7
-    sim.rc.mode, sim.rc.throttle = "P", -1.0
+    sim.rc.mode, sim.rc.throttle = "P", -0.4
     sim.run(8.0)
     assert sim.phase is Phase.STANDBY and not sim.plant.motors_on
 

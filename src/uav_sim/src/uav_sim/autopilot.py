@@ -6,35 +6,21 @@ Follows doc/dji_sdk.md sections 3.5, 4, 5, 9; what that page marks as open is a 
 """
 
 from collections import deque
-from typing import Deque, List, NamedTuple, Optional
+from typing import Deque, List, Optional
 
 from uav_sim.authority import Ack, ControlAuthority
 from uav_sim.auto_flight import AutoFlight
 from uav_sim.flight_loops import FlightLoops
 from uav_sim.guidance import Guidance
 from uav_sim.low_battery import LowBattery
-from uav_sim.phase import (
-    FLIGHT_STATUS,
-    GOOD_GPS,
-    TASK_TAKE_OFF,
-    TASKS,
-    Phase,
-    task_objection,
-)
+from uav_sim.phase import FLIGHT_STATUS, GOOD_GPS, TASK_TAKE_OFF, TASKS, Phase, task_objection
 from uav_sim.plant import Plant
 from uav_sim.remote_control import RemoteControl
-from uav_sim.setpoint import Horizontal, Setpoint, limited
+from uav_sim.setpoint import Horizontal, Receipt, Setpoint, limited
 
 STICK_COMMAND_TIME = 1.0  # [s] sticks held in their lower corners start the motors; assumption
 LIFT_OFF_THROTTLE = 0.1  # [1] stick above centre with which the pilot lifts off; assumption
 CARRYING = 0.9  # [1] less than this part of the hover thrust does not carry the aircraft
-
-
-class Receipt(NamedTuple):
-    """What became of a setpoint; ``text`` says why it was ignored, or what was limited."""
-
-    accepted: bool
-    text: str = ""
 
 
 class Autopilot:
@@ -65,6 +51,7 @@ class Autopilot:
         self._home = (x, y, 0.0 if airborne else z)
         self._t = self._rc_seen = self._corners_since = t
         self.control.held = authority
+        self.low_battery.start()
         preset = self._plant.preset
         lift = preset.thrust.acceleration(self._plant.hover_percent)
         self._loops.start(vertical_trim=lift - preset.gravity if airborne else 0.0)
@@ -84,6 +71,12 @@ class Autopilot:
         """Height above the take-off spot [m], as taken when it took off."""
         return self._plant.position[2] - self._home[2]
 
+    def crash(self, t: float, words: str) -> None:
+        """Stop the motors for good, at ``t`` [s]."""
+        self._plant.motors_on = False
+        self._events.append(f"crashed: {words}; the motors stay off")
+        self._enter(t, Phase.CRASHED)
+
     def take_events(self) -> List[str]:
         """Return in words what has happened since the last call and no topic shows."""
         return [self._events.popleft() for _ in range(len(self._events))]
@@ -99,10 +92,10 @@ class Autopilot:
         """Start or stop the motors on the ground."""
         if not self.control.held:
             ack, self.refusal = 1, "no control authority"
-        elif not start and self.phase not in (Phase.STANDBY, Phase.LANDED):
-            ack, self.refusal = 3, f"the aircraft is {self.phase.value}"
         elif start == self._plant.motors_on:
             ack, self.refusal = 2, f"the motors are {'on' if start else 'off'} already"
+        elif self.phase not in (Phase.STANDBY, Phase.LANDED):
+            ack, self.refusal = 3, f"the aircraft is {self.phase.value}"
         else:
             ack, self.refusal = 0, ""
             self._plant.motors_on = start
@@ -298,4 +291,5 @@ _BEHAVIOUR = {
     Phase.GOING_HOME: Autopilot._go_home,
     Phase.LANDING: Autopilot._land,
     Phase.LANDED: Autopilot._stand,
+    Phase.CRASHED: lambda self, _: self._plant.command(0.0, 0.0, 0.0, 0.0),
 }

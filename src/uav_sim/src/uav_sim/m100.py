@@ -6,7 +6,7 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tu
 
 import numpy as np
 
-from uav_sim.autopilot import Ack, Autopilot, Phase, Receipt
+from uav_sim.autopilot import Ack, Autopilot, Phase
 from uav_sim.battery import Battery
 from uav_sim.body import BodyState
 from uav_sim.disturbance import Disturbance
@@ -18,7 +18,7 @@ from uav_sim.plant import Plant, Vector
 from uav_sim.preset import PACKET_PERIOD, PlantPreset
 from uav_sim.remote_control import RemoteControl
 from uav_sim.sensors import Sensors
-from uav_sim.setpoint import Setpoint, decode
+from uav_sim.setpoint import Receipt, Setpoint, decode
 from uav_sim.telemetry import Packet, Telemetry, body_rates
 from uav_sim.vicon import Vicon, ViconPose
 from uav_sim.wind import Wind
@@ -113,10 +113,13 @@ class SimulatedM100:
             self.autopilot.update(self.t)
         else:
             self._navigate(self.autopilot.update, self.t)
+        flew = not plant.on_ground
         plant.step()
         self._steps += 1
         self.t = self._steps * self._step
         self.world.observe(self.t, plant.position)
+        if flew and plant.on_ground:
+            self._touch_down()
         if self._vicon is not None:
             self.new_poses = self._vicon.poses(self.t, plant.position, plant.rpy)
         if self.laser is not None:
@@ -258,6 +261,16 @@ class SimulatedM100:
             return act(*args)
         finally:
             plant.position = true
+
+    def _touch_down(self) -> None:
+        """Take note of a crash: too hard, or tilted."""
+        plant, touchdown = self.plant, self.preset.touchdown
+        speed = math.hypot(*plant.velocity[:2], plant.impact_speed)
+        tilt = math.hypot(*plant.rpy[:2])
+        if self.phase is not Phase.CRASHED and touchdown.is_crash(speed, tilt):
+            self.world.crash(self.t)
+            words = f"touch-down at {speed:.1f} m/s, tilted {math.degrees(tilt):.0f} deg"
+            self.autopilot.crash(self.t, words)
 
     def _scan(self, laser: Laser) -> None:
         self.new_scan = None

@@ -18,6 +18,7 @@ class Phase(enum.Enum):
     GOING_HOME = "flying home"
     LANDING = "landing"
     LANDED = "just landed"
+    CRASHED = "crashed"
 
 
 # Number of a task -> what it begins with.
@@ -34,6 +35,7 @@ FLIGHT_STATUS = {
     Phase.GOING_HOME: 3,
     Phase.LANDING: 4,
     Phase.LANDED: 5,
+    Phase.CRASHED: 1,
 }
 
 

@@ -80,6 +80,18 @@ class GroundEffect:
 
 
 @dataclass(frozen=True)
+class Touchdown:
+    """What a touch-down may be; a harder one is a crash, after which the motors stay off."""
+
+    speed: float = _number()  # [m/s] norm of the velocity
+    tilt: float = _number()  # [rad] norm of roll and pitch
+
+    def is_crash(self, speed: float, tilt: float) -> bool:
+        """Whether a speed [m/s] or a tilt [rad] is too much."""
+        return speed > self.speed or tilt > self.tilt
+
+
+@dataclass(frozen=True)
 class BatteryModel:
     """Discharge over time, and what a charge takes from the thrust."""
 
@@ -210,6 +222,7 @@ class PlantPreset:
     gravity_const: float = _number()  # [m/s^2 per g] scale of the accelerometer
     ground_friction: float = _number()  # [1]
     ground_effect: GroundEffect = field()
+    touchdown: Touchdown = field()
     payload: float = _number()  # [kg] on top of the mass
     battery: BatteryModel = field()
     home: GeoPoint = field()  # the world's origin

@@ -85,6 +85,13 @@ class Setpoint(NamedTuple):
         return ", ".join(words).lower() + (", stable" if self.stable else "")
 
 
+class Receipt(NamedTuple):
+    """What became of a setpoint; ``text`` says why it was ignored, or what was limited."""
+
+    accepted: bool
+    text: str = ""
+
+
 def decode(suffix: str, axes: Sequence[float]) -> Setpoint:
     """Return the setpoint in a Joy message's axes as the flight controller gets it.
 

@@ -16,9 +16,11 @@ from uav_sim.motion import Vector
 from uav_sim.obstacle import Obstacle
 from uav_sim.scene import Scene
 
+GROUND = "ground"  # id of the collision that a crash on the ground is
+
 
 class Collision(NamedTuple):
-    """One contact of the hull with an obstacle."""
+    """One contact of the hull with an obstacle, or a crash on the ground with clearance 0."""
 
     id: str
     t: float  # [s] of the least distance within the step in which the contact began
@@ -103,6 +105,12 @@ class World:
         if self.scene.bodies(self.name):
             self.scene.report(self.name, t, position)
         return self.new_collisions
+
+    def crash(self, t: float) -> None:
+        """Take note of a crash on the ground at ``t`` [s], after ``observe`` of that time."""
+        collision = Collision(GROUND, t, 0.0)
+        self.new_collisions.append(collision)
+        self.collisions.append(collision)
 
     def check(self, t0: float, start: Vector, t: float, end: Vector) -> None:
         """Judge the straight way from ``start`` to ``end`` (3,) [m] between two times [s]."""

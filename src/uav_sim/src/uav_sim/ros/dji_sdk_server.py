@@ -10,14 +10,13 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import String
 
 from dji_sdk.msg import GPSUTC, FCTimeInUTC, MobileData, PayloadData, VOPosition
-from uav_sim.autopilot import Receipt
 from uav_sim.m100 import SimulatedM100
 from uav_sim.ros.conversions import TELEMETRY
 from uav_sim.ros.payload_services import PayloadServices
 from uav_sim.ros.ports import Ports
 from uav_sim.ros.services import FlightServices
 from uav_sim.ros.throttle import Throttle
-from uav_sim.setpoint import FLAGS, TOPIC_PREFIX
+from uav_sim.setpoint import FLAGS, TOPIC_PREFIX, Receipt
 from uav_sim.telemetry import Packet
 
 QUEUE = 10  # of every publisher and subscriber of dji_sdk (doc/dji_sdk.md 1)
