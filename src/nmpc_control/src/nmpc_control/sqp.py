@@ -98,19 +98,22 @@ class SqpSolver:
                 model.failed()
                 continue
             left, stationary = step.to_gain / scale, step.residual <= self.tolerance
-            if left > self.tolerance and not stationary:
+            is_enough = left <= self.tolerance
+            if left > _ROUNDING and not stationary:  # also where it is enough: the step is there
                 iterations += 1
                 new_cost, alpha = self._search(cost, step)
-                if new_cost is None and (left < _ROUNDING or model.exhausted):
-                    status = "stalled"
-                    break
-                if new_cost is None:
+                if new_cost is None and not is_enough:
+                    if model.exhausted:
+                        status = "stalled"
+                        break
                     model.failed()
                     continue
-                full = alpha == 1.0 and model.damping == 0.0
-                left = left_to_gain(step, cost - new_cost) / scale if full else np.inf
-                model.succeeded((cost - new_cost) / scale)
-                cost = new_cost
+                if new_cost is not None:
+                    full = alpha == 1.0 and model.damping == 0.0
+                    after = left_to_gain(step, cost - new_cost) / scale if full else np.inf
+                    left = min(left, after) if is_enough else after
+                    model.succeeded((cost - new_cost) / scale)
+                    cost = new_cost
             if left <= accuracy or stationary:
                 gap, moved, cost = self._update_multipliers(cost)
                 is_exact = gap <= self.tolerance * scale or moved <= _NO_EXCESS
