@@ -65,7 +65,11 @@ def test_what_flies_says_converged_only_within_its_tolerance(compiled):
     worse = []
     for rate in (base.limits.input_rate, np.array([5.0, 0.6, 0.6, 0.6])):
         p = dataclasses.replace(base, limits=dataclasses.replace(base.limits, input_rate=rate))
-        flies = Nmpc(dataclasses.replace(p, solver=p.solver.with_budget(time_budget=10.0)))
+        flies = Nmpc(
+            dataclasses.replace(
+                p, solver=p.solver.with_budget(max_iterations=200, time_budget=10.0)
+            )
+        )
         compiled.use(p)
         for x0 in random_states(15, seed=17):
             for obstacles in ((), (SPHERE,)):
