@@ -105,3 +105,13 @@ def test_an_empty_battery_does_not_carry():
     sim = flying(0.0)
     sim.run(2.0)
     assert sim.truth.velocity[2] < -2.0 or sim.plant.on_ground
+
+
+def test_each_flight_is_sent_home_once():
+    sim = SimulatedM100(load_preset("dji_hil", {"flight_controller": {"battery_go_home": 30.0}}))
+    for _ in range(2):
+        sim.place((0.0, 0.0, 10.0), authority=True)
+        sim.plant.place((20.0, 0.0, 10.0))
+        sim.battery = 25.0
+        sim.run(1.0)
+        assert sim.phase is Phase.GOING_HOME

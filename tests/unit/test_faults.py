@@ -173,3 +173,12 @@ def recover(sim):
     sim.place(HOVER, authority=True)
     sim.battery = max(sim.battery, 50.0)
     fly(sim, 0.5)
+
+
+def test_a_mass_falls_on_top_of_the_payload():
+    preset = load_preset("dji_hil", {"payload": 0.7})
+    sim = SimulatedM100(preset)
+    sim.place((0.0, 0.0, 20.0))
+    sim.faults.apply("mass_change", added=0.5)
+    carried = preset.thrust.acceleration(sim.plant.hover_percent) * preset.mass / preset.gravity
+    assert carried == pytest.approx(preset.mass + 0.7 + 0.5)

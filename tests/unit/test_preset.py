@@ -4,6 +4,7 @@ import pytest
 
 from uav_sim.config import config_directory, from_dict, load_yaml
 from uav_sim.errors import ConfigError
+from uav_sim.plant import Plant
 from uav_sim.preset import FirstOrder, PlantPreset, SecondOrder, load_preset, preset_names
 
 
@@ -92,3 +93,21 @@ def test_exponents_are_numbers(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text("a: 1e-3\nb: -2.E+4\nc: e3\n")
     assert load_yaml(path) == {"a": 1e-3, "b": -2e4, "c": "e3"}
+
+
+def test_thrust_ends_at_what_an_m100_can_give():
+    """79.5 N at most, by 2.895 kg; only ETH's line, a fit around hover, gets there."""
+    full = {name: load_preset(name).thrust.acceleration(100.0) for name in preset_names()}
+    assert full == {
+        "dji_hil": pytest.approx(20.487),
+        "eth": 27.4,
+        "paper": pytest.approx(26.2522),
+    }
+    eth = load_preset("eth").thrust
+    assert eth.acceleration(67.0) == pytest.approx(0.46748 * 67.0 - 4.18158)
+    plant = Plant(load_preset("eth"))
+    plant.place((0.0, 0.0, 10.0))
+    plant.command(0.0, 0.0, 100.0, 0.0)
+    for _ in range(100):
+        plant.step()
+    assert plant.acceleration[2] == pytest.approx(27.4 - 9.81, abs=0.15)

@@ -41,14 +41,17 @@ Response = Union[FirstOrder, SecondOrder]
 
 @dataclass(frozen=True)
 class Thrust:
-    """Affine map from DJI's thrust percentage to acceleration along body z."""
+    """Affine map from DJI's thrust percentage to acceleration along body z, up to a limit."""
 
     slope: float = _number(1e-6)  # [m/s^2 per percent]
     offset: float = _number(-math.inf)  # [m/s^2]
+    limit: float = _number()  # [m/s^2] what the rotors give at most
 
     def acceleration(self, percent: float) -> float:
         """Return the acceleration [m/s^2] of a percentage; propellers never push, 0 is idle."""
-        return max(0.0, self.slope * percent + self.offset) if percent > 0.0 else 0.0
+        if percent <= 0.0:
+            return 0.0
+        return min(max(0.0, self.slope * percent + self.offset), self.limit)
 
     def percent(self, acceleration: float) -> float:
         """Return the percentage for an acceleration [m/s^2]."""

@@ -63,7 +63,11 @@ def spread(seed: int) -> PlantPreset:
         "roll": {**shape, key: attitude[key]},
         "pitch": {**shape, key: pitch},
         "yaw_rate": drawn["yaw_rate"],
-        "thrust": {"slope": slope, "offset": common["gravity"] - slope * thrust["hover"]},
+        "thrust": {
+            "slope": slope,
+            "offset": common["gravity"] - slope * thrust["hover"],
+            "limit": load_preset("eth").thrust.limit,
+        },
         "rotor_time_constant": drawn["rotor_time_constant"],
         "drag": {"frame": coins.choice(("heading", "world")), **drawn["drag"]},
         "tilt_limit": drawn["tilt_limit"],

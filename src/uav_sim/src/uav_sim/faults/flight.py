@@ -131,7 +131,8 @@ class MassChange(Fault):
     def begin(self, context: Context) -> None:
         """Change the mass."""
         plant = context.aircraft.plant
-        part = self.added / plant.preset.mass
+        preset = plant.preset
+        part = self.added / (preset.mass + preset.payload)  # the factor is on both
         context.overrides.add(
             self, plant, "mass_factor", lambda factor: max(factor + part, MIN_MASS_FACTOR)
         )
