@@ -8,18 +8,22 @@ pytestmark = pytest.mark.ros
 SPEED = 4  # simulated seconds per second
 
 
-@pytest.fixture
-def flights(ros, tmp_path):
-    """One simulator for all three: each leaves the aircraft on the ground with motors off."""
-    settings = tmp_path / "lift_off.yaml"
-    settings.write_text("flight_controller: {setpoints_need_air: false}\n")
-    ros.launch("uav_sim", "simulator.launch", speed_factor=SPEED, settings_file=settings)
+def simulate(ros, **arguments):
+    """Start a simulator: one may fly after the other, each leaves the aircraft on the ground."""
+    ros.launch("uav_sim", "simulator.launch", speed_factor=SPEED, **arguments)
     ros.wait_for_node("/uav_sim")
-    return ros
 
 
-def test_controllers_written_for_the_aircraft_fly_unmodified(flights):
-    demo = flights.run_json("foreign_demo.py")
+def assert_quiet(log):
+    """Nothing went wrong, and nothing was ignored before a controller noticed its landing."""
+    assert "Traceback" not in log
+    ignored = [line for line in log.splitlines() if " ignored: " in line]
+    assert all("the aircraft is just landed" in line for line in ignored), ignored
+
+
+def test_controllers_written_for_the_aircraft_fly_unmodified_by_default(ros):
+    simulate(ros)
+    demo = ros.run_json("foreign_demo.py")
     assert demo.pop("gained") == pytest.approx(1.2, abs=0.1)
     corners = [(2.0, 0.0, 3.0), (2.0, 2.0, 3.0), (0.0, 2.0, 3.0), (0.0, 0.0, 3.0)]
     assert demo.pop("reached") == [pytest.approx(corner, abs=0.2) for corner in corners]
@@ -27,7 +31,23 @@ def test_controllers_written_for_the_aircraft_fly_unmodified(flights):
     assert demo.pop("landed_for") == pytest.approx(2.0, abs=0.15)
     assert all(demo.values()), demo
 
-    velocity = flights.run_json("foreign_velocity.py")
+    attitude = ros.run_json("foreign_attitude.py")
+    assert attitude.pop("errors") == pytest.approx([0.0, 0.0, 0.0], abs=0.15)
+    assert attitude.pop("errors_later") == pytest.approx([0.0, 0.0, -1.0], abs=0.15)
+    assert 0.05 < attitude.pop("largest_rate") < 3.0
+    assert all(attitude.values()), attitude
+    log = ros.output_of_all()
+    assert "following setpoints: horizontal angle, vertical velocity, yaw rate, body" in log
+    assert "following setpoints: horizontal angle, vertical position, yaw rate, body" in log
+    assert_quiet(log)
+
+
+def test_one_that_lifts_off_by_setpoints_flies_where_that_is_allowed(ros, tmp_path):
+    """Whether an M100 does is open: ``setpoints_need_air`` is the switch for it."""
+    settings = tmp_path / "lift_off.yaml"
+    settings.write_text("flight_controller: {setpoints_need_air: false}\n")
+    simulate(ros, settings_file=settings)
+    velocity = ros.run_json("foreign_velocity.py")
     assert velocity.pop("errors") == pytest.approx([0.0, 0.0, 0.0], abs=0.1)
     assert velocity.pop("yaw") == pytest.approx(1.0, abs=0.05)
     assert velocity == {
@@ -43,16 +63,4 @@ def test_controllers_written_for_the_aircraft_fly_unmodified(flights):
         "release": 1,
         "statuses": [1, 3, 5, 1],
     }
-
-    attitude = flights.run_json("foreign_attitude.py")
-    assert attitude.pop("errors") == pytest.approx([0.0, 0.0, 0.0], abs=0.15)
-    assert attitude.pop("errors_later") == pytest.approx([0.0, 0.0, -1.0], abs=0.15)
-    assert 0.05 < attitude.pop("largest_rate") < 3.0
-    assert all(attitude.values()), attitude
-    log = flights.output_of_all()
-    assert "following setpoints: horizontal angle, vertical velocity, yaw rate, body" in log
-    assert "following setpoints: horizontal angle, vertical position, yaw rate, body" in log
-    assert "Traceback" not in log
-    # A controller notices that it has landed only after the fact.
-    ignored = [line for line in log.splitlines() if " ignored: " in line]
-    assert all("the aircraft is just landed" in line for line in ignored), ignored
+    assert_quiet(ros.output_of_all())
