@@ -149,7 +149,7 @@ class Autopilot:
             if silence > self._settings.cmd_timeout + 1e-9 or not rc.allows_sdk:
                 self._setpoint_time = None
                 self._events.append(f"no setpoint for {silence:.2f} s: {self._without_setpoint}")
-        _BEHAVIOUR[self.phase](self, t)
+        self._behaviour(self, t)
 
     @property
     def authority(self) -> bool:
@@ -204,7 +204,7 @@ class Autopilot:
             self._enter(t, Phase.FLYING)
 
     def _enter(self, t: float, phase: Phase) -> None:
-        self.phase = phase
+        self.phase, self._behaviour = phase, _BEHAVIOUR[phase]
         self._since = t
         self._grounded_since: Optional[float] = None
         self._setpoint_time: Optional[float] = None  # None: no setpoint to follow
@@ -217,7 +217,7 @@ class Autopilot:
             if self._plant.on_ground:
                 self._home = self._plant.position
             else:
-                self.phase = Phase.FLYING
+                self.phase, self._behaviour = Phase.FLYING, Autopilot._fly
             self._plant.command(*self._guidance.follow(self._home[2]))
             return
         self._plant.command(0.0, 0.0, 0.0, 0.0)

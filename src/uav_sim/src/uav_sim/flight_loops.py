@@ -31,6 +31,7 @@ class FlightLoops:
         self._gains = preset.flight_controller.loops
         self._limits = preset.flight_controller.limits
         self._step = preset.step
+        self._gravity, self._tilt_limit = preset.gravity, preset.tilt_limit
         self.start()
 
     def start(self, vertical_trim: float = 0.0) -> None:
@@ -65,10 +66,9 @@ class FlightLoops:
             self._trim = (trim[0], trim[1], self._trim[2])
             ax, ay = ax + trim[0], ay + trim[1]
         cos_yaw, sin_yaw = math.cos(plant.yaw), math.sin(plant.yaw)
-        gravity = plant.preset.gravity
-        pitch = math.atan2(cos_yaw * ax + sin_yaw * ay, gravity)
-        roll = math.atan2(sin_yaw * ax - cos_yaw * ay, gravity)
-        return limit_norm(roll, pitch, plant.preset.tilt_limit)
+        pitch = math.atan2(cos_yaw * ax + sin_yaw * ay, self._gravity)
+        roll = math.atan2(sin_yaw * ax - cos_yaw * ay, self._gravity)
+        return limit_norm(roll, pitch, self._tilt_limit)
 
     def position(self, x: float, y: float, speed: float) -> Tuple[float, float]:
         """Return roll and pitch [rad] towards a position [m], at most at ``speed`` [m/s]."""
@@ -92,7 +92,7 @@ class FlightLoops:
         trim = _clamp(self._trim[2] + gain * error, gains.trim_limit)
         self._trim = (self._trim[0], self._trim[1], trim)
         roll, pitch, _ = plant.rpy
-        lift = plant.preset.gravity + gains.vertical_velocity * error + trim
+        lift = self._gravity + gains.vertical_velocity * error + trim
         percent = plant.preset.thrust.percent(lift / (math.cos(roll) * math.cos(pitch)))
         return min(max(percent, self._limits.thrust_min), self._limits.thrust_max)
 

@@ -19,7 +19,7 @@ from uav_sim.preset import PACKET_PERIOD, PlantPreset
 from uav_sim.remote_control import RemoteControl
 from uav_sim.sensors import Sensors
 from uav_sim.setpoint import Receipt, Setpoint, decode
-from uav_sim.telemetry import Packet, Telemetry, body_rates
+from uav_sim.telemetry import Packet, Status, Telemetry, body_rates
 from uav_sim.vicon import Vicon, ViconPose
 from uav_sim.wind import Wind
 from uav_sim.world import Collision, World
@@ -103,7 +103,9 @@ class SimulatedM100:
     def step(self) -> List[Packet]:
         """Advance by ``preset.step``; return the packets received in it, oldest first."""
         plant = self.plant
-        self.faults.update(self.t)
+        faults = self.faults
+        if not faults.rest:
+            faults.update(self.t)
         if self._wind is not None and self._steps % self._wind.steps == 0:
             plant.wind = self._wind.advance(plant.position[2], plant.velocity)
         if self._commands is not None:
@@ -127,23 +129,20 @@ class SimulatedM100:
         if self._steps % self._steps_per_packet == 0:
             if self._steps % self._steps_per_drain == 0:
                 self._drain()
-            self._telemetry.sample(
-                self.t,
-                rc=self.rc.axes(self._rc_values),
-                gps_health=self.autopilot.gps_health,
-                height=self.autopilot.height,
-                flight_status=self.autopilot.flight_status,
-                battery=float(math.ceil(self.battery)),
-            )
-        return self.faults.filter(self.t, self._telemetry.due(self.t))
+            self._telemetry.sample(self.t, self._status)
+        packets = self._telemetry.due(self.t)
+        return packets if faults.rest else faults.filter(self.t, packets)
 
     def run(self, duration: float) -> List[Packet]:
         """Advance by a duration [s]; return all packets received."""
-        return [packet for _ in range(round(duration / self.preset.step)) for packet in self.step()]
+        step, packets = self.step, []
+        for _ in range(round(duration / self.preset.step)):
+            packets += step()
+        return packets
 
     def setpoint(self, suffix: str, axes: Sequence[float]) -> Receipt:
         """Send axes on the topic ``flight_control_setpoint_<suffix>``; say what became of them."""
-        fault = self.faults.objection(suffix)
+        fault = "" if self.faults.rest else self.faults.objection(suffix)
         if fault:
             return Receipt(False, fault)
         try:
@@ -232,6 +231,16 @@ class SimulatedM100:
     def clearance(self) -> Dict[str, float]:
         """Least distance [m] from hull to each obstacle's surface since the flight began, by id."""
         return self.world.clearance
+
+    def _status(self) -> Status:
+        autopilot = self.autopilot
+        return Status(
+            rc=self.rc.axes(self._rc_values),
+            gps_health=autopilot.gps_health,
+            height=autopilot.height,
+            flight_status=autopilot.flight_status,
+            battery=float(math.ceil(self._battery.percent)),
+        )
 
     def _drain(self) -> None:
         """Discharge by the present thrust, and sag."""

@@ -106,7 +106,7 @@ def decode(suffix: str, axes: Sequence[float]) -> Setpoint:
     needed = 5 if flag is None else 4
     if len(axes) < needed:
         raise SetpointError(f"{len(axes)} axes instead of {needed}")
-    if not all(math.isfinite(value) for value in axes[:needed]):
+    if not all(map(math.isfinite, axes[:needed])):
         raise SetpointError(f"axes {tuple(axes[:needed])} are not all finite")
     if flag is None:
         flag = int(axes[4])
@@ -152,6 +152,8 @@ def limited(setpoint: Setpoint, limits: Limits, tilt_limit: float) -> Tuple[Setp
         limits: ranges of the flight controller.
         tilt_limit: norm of the vector (roll, pitch) [rad].
     """
+    if _is_within(setpoint, limits, tilt_limit):
+        return setpoint, ""
     x, y, z, yaw = setpoint.x, setpoint.y, setpoint.z, setpoint.yaw
     words: List[str] = []
     if setpoint.horizontal is Horizontal.ANGLE:
@@ -170,9 +172,28 @@ def limited(setpoint: Setpoint, limits: Limits, tilt_limit: float) -> Tuple[Setp
     if setpoint.yaw_mode is Yaw.RATE:
         bound = math.degrees(limits.yaw_rate)
         yaw = _clamp(words, "yaw rate", yaw, -bound, bound, "deg/s")
-    if not words:
-        return setpoint, ""
     return setpoint._replace(x=x, y=y, z=z, yaw=yaw), ", ".join(words)
+
+
+def _is_within(setpoint: Setpoint, limits: Limits, tilt_limit: float) -> bool:
+    """Whether nothing is out of range."""
+    horizontal, vertical, yaw_mode, _, _, x, y, z, yaw = setpoint
+    if horizontal is Horizontal.ANGLE:
+        if math.hypot(x, y) > math.degrees(tilt_limit) + ROUNDING:
+            return False
+    elif horizontal is Horizontal.VELOCITY:
+        if math.hypot(x, y) > limits.horizontal_velocity + ROUNDING:
+            return False
+    if vertical is Vertical.THRUST:
+        low, high = limits.thrust_min, limits.thrust_max
+    elif vertical is Vertical.POSITION:
+        low, high = 0.0, limits.height
+    else:
+        high = limits.vertical_velocity
+        low = -high
+    if not low - ROUNDING <= z <= high + ROUNDING:
+        return False
+    return yaw_mode is Yaw.ANGLE or abs(yaw) <= math.degrees(limits.yaw_rate) + ROUNDING
 
 
 def _shorten(

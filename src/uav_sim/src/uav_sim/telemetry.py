@@ -7,7 +7,7 @@ Order, rates, frames, units, signs follow doc/dji_sdk.md section 2; a packet is 
 import math
 from collections import deque
 from math import cos, sin
-from typing import Any, Deque, List, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Deque, List, NamedTuple, Optional, Tuple
 
 from uav_sim.link import TelemetryLink, insert
 from uav_sim.plant import Plant, Vector
@@ -37,6 +37,16 @@ class Imu(NamedTuple):
     orientation: Tuple[float, float, float, float]  # x, y, z, w, body FLU to ENU
     angular_velocity: Vector  # [rad/s] body FLU
     linear_acceleration: Vector  # [m/s^2] specific force, body FLU: +9.8 on z at rest
+
+
+class Status(NamedTuple):
+    """What the flight controller reports beside the plant's state."""
+
+    rc: Tuple[float, ...]  # six axes
+    gps_health: int  # 0..5
+    height: float  # [m] above take-off
+    flight_status: int  # of the M100's enumeration
+    battery: float  # [percent] state of charge
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Tuple[float, float, float, float]:
@@ -148,25 +158,12 @@ class Telemetry:
         """Make the world's origin that of ``local_position``, whatever has been received."""
         self._refer(t, self.frame.home)
 
-    def sample(
-        self,
-        t: float,
-        *,
-        rc: Tuple[float, ...],
-        gps_health: int,
-        height: float,
-        flight_status: int,
-        battery: float,
-    ) -> None:
+    def sample(self, t: float, status: Callable[[], Status]) -> None:
         """Send the packet of time ``t`` [s]; to be called every 0.01 s.
 
         Args:
             t: time of sampling [s].
-            rc: six axes.
-            gps_health: 0..5.
-            height: above take-off [m].
-            flight_status: of the M100's enumeration.
-            battery: state of charge [percent].
+            status: returns what the 50 Hz topics say beside the plant's state; asked only for them.
         """
         count, plant = self._count, self._plant
         self._count += 1
@@ -183,6 +180,7 @@ class Telemetry:
         if count % _MEDIUM:
             values = [("attitude", attitude), ("imu", imu)]
         else:
+            rc, gps_health, height, flight_status, battery = status()
             position, velocity = plant.position, plant.velocity
             if sensors is not None:
                 position, velocity, height = sensors.navigation(position, velocity, height)
@@ -221,26 +219,28 @@ class Telemetry:
     def due(self, t: float) -> List[Packet]:
         """Return the packets received until ``t`` [s], oldest first."""
         pending, packets, limit = self._pending, [], t + 1e-9
+        make = tuple.__new__  # as Packet(...) does, at half the cost
         while pending and pending[0][0] <= limit:
             received, values = pending.popleft()
             if len(values) != _INERTIAL:
                 values = self._noted(values)
-            packets.extend([Packet(topic, received, value) for topic, value in values])
+            packets += [make(Packet, (topic, received, value)) for topic, value in values]
         return packets
 
     def _noted(self, values: Values) -> Values:
         """Return received values with the local position, which the node computes on receipt."""
-        result = []
-        for topic, value in values:
-            result.append((topic, value))
+        k = 0
+        while k < len(values):
+            topic, value = values[k]
+            k += 1
             if topic == "gps_health":
                 self._health = value
             elif topic == "gps_position":
                 self._place = value
                 # A reference counts from the next packet on.
                 if self.frame.reference is not None:
-                    result.append(("local_position", self.frame.to_local(value)))
-        return result
+                    values.insert(k, ("local_position", self.frame.to_local(value)))
+        return values
 
     def _refer(self, t: float, place: GeoPoint) -> None:
         if self.sensors is not None:

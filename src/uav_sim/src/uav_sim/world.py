@@ -101,7 +101,8 @@ class World:
         Returns the contacts begun since the last sample; where several aircraft share a scene they
         are known, in ``new_collisions``, only after the last one has been observed.
         """
-        self.new_collisions = []
+        if self.new_collisions:
+            self.new_collisions = []
         if self.scene.bodies(self.name):
             self.scene.report(self.name, t, position)
         return self.new_collisions

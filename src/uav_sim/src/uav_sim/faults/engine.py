@@ -54,6 +54,7 @@ class Faults:
         self._pending: List[Entry] = []
         self._late: List[Packet] = []
         self._count = 0
+        self.rest = True  # nothing acts, nothing is to come: asking may be left out
 
     @property
     def active(self) -> Tuple[Entry, ...]:
@@ -107,6 +108,7 @@ class Faults:
         if any(entry.id == id for entry in (*self._active, *self._pending)):
             raise ConfigError(source, "id", id, "an id that no other fault has")
         entry = Entry(id, kind, fault, since, since + duration)
+        self.rest = False
         if since > t:
             self._pending.append(entry)
             self._pending.sort(key=lambda e: e.since)
@@ -140,6 +142,7 @@ class Faults:
         """Return what becomes of the packets received at ``t`` [s]; called every step."""
         if self._late:
             packets, self._late = [*self._late, *packets], []
+        self.rest = not self._active and not self._pending
         for entry in self._active:
             packets = entry.fault.filter(t, packets)
         return packets
