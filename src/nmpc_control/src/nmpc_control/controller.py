@@ -105,19 +105,7 @@ class Controller:
         except ProblemError as error:
             self.nmpc.reset()
             nothing = no_solution(x0, self.nmpc.structure.horizon, str(error))
-        return Plan(
-            t=t,
-            dt=self.nmpc.structure.dt,
-            delay=self.parameters.vehicle.delay,
-            states=nothing.states,
-            inputs=nothing.inputs,
-            found=nothing.found,
-            status=nothing.status,
-            iterations=nothing.iterations,
-            solve_time=nothing.solve_time,
-            cost=nothing.cost,
-            kkt_residual=nothing.kkt_residual,
-        )
+            return self.nmpc.as_plan(t, nothing)
 
     def _input_before(self, t: float) -> np.ndarray:
         """Return the input (4,) in force before ``t``.

@@ -86,6 +86,10 @@ class Nmpc:
         )
         solution = self.solver.solve(Instance(x0, u_before, stages, self._theta), guess)
         self._last, self._last_t = (solution, t) if solution.found else (None, 0.0)
+        return self.as_plan(t, solution, self._exceeded(solution, x0, slots))
+
+    def as_plan(self, t: float, solution: Solution, remark: str = "") -> Plan:
+        """Return a solution as plan of time ``t`` [s], its status with a remark."""
         return Plan(
             t=t,
             dt=self.structure.dt,
@@ -93,7 +97,7 @@ class Nmpc:
             states=solution.states,
             inputs=solution.inputs,
             found=solution.found,
-            status=solution.status + self._exceeded(solution, x0, slots),
+            status=solution.status + remark,
             iterations=solution.iterations,
             solve_time=solution.solve_time,
             cost=solution.cost,
