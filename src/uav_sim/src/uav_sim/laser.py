@@ -143,7 +143,8 @@ def _round(offset: np.ndarray, beams: np.ndarray, radius: float) -> Tuple[np.nda
 
 def _slab(offset: float, beams: np.ndarray, half: float) -> Tuple[np.ndarray, np.ndarray]:
     """Return where beams (n,) enter and leave the slab between -half and half of one axis."""
-    near, far = (-half - offset) / beams, (half - offset) / beams
+    with np.errstate(over="ignore"):  # nearly parallel: infinitely far
+        near, far = (-half - offset) / beams, (half - offset) / beams
     parallel, inside = beams == 0.0, abs(offset) < half
     enter = np.where(parallel, -np.inf if inside else np.inf, np.minimum(near, far))
     return enter, np.where(parallel, np.inf if inside else -np.inf, np.maximum(near, far))
