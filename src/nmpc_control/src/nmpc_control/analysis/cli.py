@@ -3,6 +3,7 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import List, Optional, Sequence, Tuple
 
@@ -53,13 +54,10 @@ def _read(arguments: argparse.Namespace, paths: Sequence[Path]) -> Tuple[List[Fl
             _complain(f"{path}: {error}")
             has_failed = True
             continue
-        for record in records:
+        for read in records:
+            record = replace(read, between=arguments.between and tuple(arguments.between))
             metrics = flight_metrics(
-                record,
-                arguments.vehicle_radius,
-                arguments.limits,
-                arguments.segments,
-                arguments.between,
+                record, arguments.vehicle_radius, arguments.limits, arguments.segments
             )
             flights.append(Flight(path, record, metrics))
     return flights, has_failed

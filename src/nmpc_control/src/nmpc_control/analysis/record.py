@@ -125,5 +125,6 @@ class FlightRecord:
     airborne: Optional[Tuple[float, float]] = None  # [s] first and last moment in the air
     automatic: Optional[Tuple[float, float]] = None  # [s] from take-off to landing, of this flight
     phase_end: Optional[float] = None  # [s] the trajectory's phase ended; None: with the data
+    between: Optional[Tuple[float, float]] = None  # [s] evaluate this; None: the scenario's phase
     reported_collisions: Optional[int] = None  # counted by the simulator
     missing: Tuple[str, ...] = ()  # plain sentences: what could not be read, and why

@@ -52,7 +52,7 @@ def shown_window(record: FlightRecord) -> Optional[Window]:
     window = scenario_window(record)
     flown = [p for p in periods(record) if p.automatic is not None]
     by_hand = [p for p in flown if not p.automatic]
-    if window is None or not by_hand:
+    if window is None or record.between is not None or not by_hand:
         return window
     start, end = min(window.start, by_hand[0].start), max(window.end, flown[-1].end)
     if record.airborne is not None:
