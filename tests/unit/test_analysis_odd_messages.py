@@ -64,7 +64,8 @@ def test_meaning_of_a_setpoint_is_in_its_flag(tmp_path):
     np.testing.assert_allclose(record.commands.values, expected, atol=1e-6)
     figures = flight_metrics(record)
     assert figures["thrust_percent"] == pytest.approx([37.0, 37.0])
-    assert figures["command_gap_ms_max"] == pytest.approx(500.0, abs=1e-3)
+    # 980 ms from the last of them to the last status
+    assert figures["command_gap_ms_max"] == pytest.approx(980.0, abs=1e-3)
 
 
 def test_setpoints_without_meaning_are_counted(flight, tmp_path):

@@ -6,10 +6,9 @@ from typing import List, Optional
 
 import numpy as np
 
+from nmpc_control.analysis.gaps import LONGEST_GAP, uncovered
 from nmpc_control.analysis.record import FlightRecord, Metrics, ObstacleTrack, Series
 from nmpc_control.analysis.windows import Window
-
-_LONGEST_GAP = 0.5  # [s] between positions; over longer ones a straight line is a guess
 
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 _BISECTIONS = 60  # shrink a segment by 0.618 each, to 3e-13 of its length
@@ -72,10 +71,17 @@ def clearance_figures(
         missing.append("no positions: no clearance")
         return figures
     flown = position.between(window.start, window.end)
-    if len(flown) > 1 and np.diff(flown.times).max() > _LONGEST_GAP:
+    lost = uncovered(flown.times, window.start, window.end)
+    if len(flown) > 1 and np.diff(flown.times).max() > LONGEST_GAP:
+        lost -= uncovered(flown.times, flown.times[0], flown.times[-1])
         gap = np.diff(flown.times).max()
         missing.append(
             f"positions are missing for up to {gap:.1f} s: clearance there is along a straight line"
+        )
+    if lost > 0.0:
+        missing.append(
+            f"positions are missing for {lost:.1f} s before the first or after the last: "
+            "no clearance there"
         )
     figures["clearance_m"] = {t.obstacle.id: clearance(flown, t, radius) for t in record.obstacles}
     figures["clearance_by"] = "truth" if record.true_position is not None else "estimate"

@@ -6,6 +6,7 @@ from typing import List, Optional
 
 import numpy as np
 
+from nmpc_control.analysis.gaps import stream_gaps
 from nmpc_control.analysis.record import (
     DEADLINE_MISSES,
     FOUND,
@@ -91,7 +92,7 @@ def command_figures(record: FlightRecord, window: Optional[Window], missing: Lis
 
 
 def command_gaps(record: FlightRecord, window: Window) -> np.ndarray:
-    """Return the times [s] between successive commands while the guard streams.
+    """Return the times [s] without a command while the guard streams: none of under two commands.
 
     Without the guard's status, all commands in the window count.
     """
@@ -101,8 +102,10 @@ def command_gaps(record: FlightRecord, window: Window) -> np.ndarray:
         streaming = mode_runs(record.status, STREAMING)
         clipped = [(max(start, first), min(end, last)) for start, end in streaming]
         periods = [(start, end) for start, end in clipped if start < end]
-    gaps = [np.diff(record.commands.between(start, end).times) for start, end in periods]
-    return np.concatenate(gaps) if gaps else np.zeros(0)
+    times = record.commands.times
+    if sum(np.sum((times >= start) & (times <= end)) for start, end in periods) < 2:
+        return np.zeros(0)
+    return np.concatenate([stream_gaps(times, start, end) for start, end in periods])
 
 
 def within(series: Optional[Series], window: Optional[Window]) -> np.ndarray:
