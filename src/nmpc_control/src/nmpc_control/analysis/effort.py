@@ -42,9 +42,10 @@ def solver_figures(record: FlightRecord, window: Optional[Window], missing: List
     figures: Metrics = dict.fromkeys(_SOLVER_FIGURES)
     status = within(record.status, window)
     if len(status):
-        counted = status[-1] - status[0]
-        figures["plans_rejected"] = int(counted[PLANS_REJECTED])
-        figures["deadline_misses"] = int(counted[DEADLINE_MISSES])
+        figures["plans_rejected"] = _counted(status[:, PLANS_REJECTED])
+        figures["deadline_misses"] = _counted(status[:, DEADLINE_MISSES])
+        if (np.diff(status[:, [PLANS_REJECTED, DEADLINE_MISSES]], axis=0) < 0.0).any():
+            missing.append("the guard restarted: its counters are summed from 0 again")
     else:
         missing.append("no status of the guard: no count of rejected plans and deadline misses")
     plans = within(record.solver, window)
@@ -67,6 +68,12 @@ def solver_figures(record: FlightRecord, window: Optional[Window], missing: List
         "max": milliseconds.max(),
     }
     return figures
+
+
+def _counted(counter: np.ndarray) -> int:
+    """Return by how much a counter (n,) rose; where it falls it started from 0 again."""
+    steps = np.diff(counter)
+    return int(np.where(steps < 0.0, counter[1:], steps).sum())
 
 
 def command_figures(record: FlightRecord, window: Optional[Window], missing: List[str]) -> Metrics:

@@ -100,6 +100,8 @@ def _retimed_figures(record: FlightRecord, window: Optional[Window], missing: Li
             "what the controller compared with is not known: no deviation from a re-timed reference"
         )
         return _deviation_figures(None, "_retimed")
+    if record.reference is None:  # what is published then is where to hold, not what to follow
+        return _deviation_figures(None, "_retimed")
     start, end = max(window.start, position.times[0]), min(window.reference_end, position.times[-1])
     tracked = tracked.between(start, end)
     error = Series(tracked.times, position.at(tracked.times) - tracked.values)
