@@ -77,6 +77,17 @@ def test_inputs_that_are_not_commanded_count_nowhere():
     assert figures["saturation"]["thrust_percent_time_s"] == 0.0
 
 
+def test_commands_beyond_the_assumed_bounds_disprove_them():
+    missing = []
+    thrust = np.where(np.arange(500) < 5, 71.0, 60.0)
+    figures = input_figures(commands(thrust, 0.349, 0.0, 0.0), WHOLE, InputLimits(), missing)
+    saturation = figures["saturation"]
+    assert [saturation[key] for key in ("thrust_percent_time_s", "time_s", "share")] == [None] * 3
+    assert saturation["roll_rad_time_s"] == pytest.approx(9.98)
+    assert "commands from 60 to 71 exceed the assumed bounds 30 to 60" in missing[0]
+    assert len(missing) == 1
+
+
 def test_jerk_of_a_cubic_velocity_is_exact():
     times = np.arange(0.0, 5.0, 0.02)
     velocity = Series(times, np.outer(0.5 * 3.0 * times**2, [0.0, 0.6, 0.8]))

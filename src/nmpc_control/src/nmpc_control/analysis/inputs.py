@@ -70,12 +70,17 @@ def input_figures(
         )
         variation[name] = np.abs(np.diff(known)).sum() / time if is_known else None
     figures["input_effort"], figures["input_variation_per_s"] = effort, variation
-    figures["saturation"] = _saturation(commands.values, held, limits)
+    figures["saturation"] = _saturation(commands.values, held, limits, missing)
     return figures
 
 
-def _saturation(commands: np.ndarray, held: np.ndarray, limits: InputLimits) -> Metrics:
-    """Return the time [s] at each bound, and at any, with its share of the commanded time."""
+def _saturation(
+    commands: np.ndarray, held: np.ndarray, limits: InputLimits, missing: List[str]
+) -> Metrics:
+    """Return the time [s] at each bound, and at any, with its share of the commanded time.
+
+    Commands beyond assumed bounds show that these were not the flight's: None, and the reason.
+    """
     bounds = {
         "thrust_percent": (limits.thrust_min, limits.thrust_max),
         "roll_rad": (-limits.angle, limits.angle),
@@ -86,10 +91,20 @@ def _saturation(commands: np.ndarray, held: np.ndarray, limits: InputLimits) -> 
     figures: Metrics = {}
     for name, (low, high) in bounds.items():
         values, margin = commands[:, _NAMES[name]], _AT_BOUND * (high - low)
+        given = values[np.isfinite(values)]
+        if (given < low - margin).any() or (given > high + margin).any():
+            missing.append(
+                f"{name}: commands from {given.min():.4g} to {given.max():.4g} exceed the assumed "
+                f"bounds {low:.4g} to {high:.4g}: no time in saturation (--vehicle names others)"
+            )
+            figures[f"{name}_time_s"] = None
+            continue
         at_bound = (values <= low + margin) | (values >= high - margin)  # false where NaN
         anywhere |= at_bound
         figures[f"{name}_time_s"] = held[at_bound].sum()
     total = held.sum()
+    if None in figures.values():
+        return {**figures, "time_s": None, "share": None}
     figures["time_s"] = held[anywhere].sum()
     figures["share"] = figures["time_s"] / total if total > 0.0 else None
     return figures
