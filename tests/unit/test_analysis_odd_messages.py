@@ -7,6 +7,7 @@ from analysis_bags import FLYING, BagBuilder, Flight
 
 from nmpc_control.analysis.bag import read_flight
 from nmpc_control.analysis.metrics import flight_metrics
+from nmpc_control.analysis.recording import read
 
 
 @pytest.fixture(scope="module")
@@ -135,3 +136,18 @@ def test_single_wrong_stamps_change_nothing_and_are_named(wrong, flight, metrics
         assert figures[key] == pytest.approx(metrics[key], rel=1e-3), key
     assert figures["command_gap_ms_max"] == pytest.approx(metrics["command_gap_ms_max"], abs=0.1)
     assert figures["streams"]["nmpc/odometry"]["gap_ms_max"] == pytest.approx(20.0, abs=0.1)
+
+
+def test_obstacles_that_stand_still_are_held_once(tmp_path):
+    builder = BagBuilder()
+    for k in range(50):
+        standing = [(f"tree{i}", (10.0 + i, 0.0, 3.0), 1.0) for i in range(20)]
+        builder.obstacles(0.1 * k, [*standing, ("bird", (0.1 * k, 0.0, 3.0), 0.2)])
+        builder.obstacles(0.1 * k, standing, topic="obstacles")
+    recording = read(builder.write(tmp_path / "trees.bag"))
+    assert "sensed_obstacles" not in recording.events
+    contents = [event.content for event in recording.events["obstacles"]]
+    assert [len(content) for content in contents] == [21] * 50
+    assert len({id(obstacle) for content in contents for obstacle in content}) == 20 + 50
+    birds = np.array([content[-1].position[0] for content in contents])
+    np.testing.assert_allclose(birds, 0.1 * np.arange(50))
