@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from analysis_bags import BagBuilder, Flight
+from analysis_bags import BagBuilder, Flight, header
 
 from nmpc_control.analysis.bag import read_flight
 from nmpc_control.analysis.following import following_figures, track_errors
@@ -68,7 +68,7 @@ def test_time_in_saturation_and_effort():
     assert saturation["share"] == pytest.approx(2.98 / 9.98)
     expected = np.sqrt((2.0 * 0.349**2 + 7.98 * 0.1**2) / 9.98)
     assert figures["input_effort"]["roll_rad"] == pytest.approx(expected)
-    assert figures["input_variation_per_s"]["roll_rad"] == pytest.approx(0.249 / 9.98)
+    assert figures["input_variation_per_s"]["roll_rad_s"] == pytest.approx(0.249 / 9.98)
 
 
 def test_inputs_that_are_not_commanded_count_nowhere():
@@ -184,6 +184,27 @@ def test_streams_battery_and_units(flight):
     assert metrics["units"]["rate_hz"] == "Hz"
     assert metrics["units"]["jerk_m_s3"] == "m/s^3"
     assert metrics["units"]["average_deviation_m"] == "m"
+    per_second = {key: metrics["units"][key] for key in metrics["input_variation_per_s"]}
+    assert per_second == {
+        "thrust_percent_s": "percent/s",
+        "roll_rad_s": "rad/s",
+        "pitch_rad_s": "rad/s",
+        "yaw_rate_rad_s2": "rad/s^2",
+    }
+    assert "input_variation_per_s" not in metrics["units"]
+    assert metrics["units"]["yaw_rate_rad_s"] == "rad/s"
+    assert metrics["units"]["roll_rad_time_s"] == "s"
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.01])
+def test_charge_as_a_share_of_1_is_shown_in_percent(scale, tmp_path):
+    bag = BagBuilder()
+    for t in (100.0, 101.0, 102.0):
+        values = {"header": header(t), "percentage": scale * (150.0 - t)}
+        bag.add("dji_sdk/battery_state", "sensor_msgs/msg/BatteryState", t, values)
+    record = read_flight(bag.write(tmp_path / "battery.bag"))
+    assert record.battery.values[:, 0] == pytest.approx([50.0, 49.0, 48.0])
+    assert ("battery_state is taken as a share of 1" in record.missing) == (scale < 1.0)
 
 
 def test_hover_thrust_is_that_of_standing_still_not_of_passing_through():

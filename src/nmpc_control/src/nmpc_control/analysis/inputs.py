@@ -16,6 +16,12 @@ _NAMES = {
     "pitch_rad": PITCH_REF,
     "yaw_rate_rad_s": YAW_RATE_REF,
 }
+_PER_S = {  # names of their variation
+    "thrust_percent": "thrust_percent_s",
+    "roll_rad": "roll_rad_s",
+    "pitch_rad": "pitch_rad_s",
+    "yaw_rate_rad_s": "yaw_rate_rad_s2",
+}
 _AT_BOUND = 1e-3  # share of the range from which on an input is at its bound
 _LONGEST_HOLD = 0.5  # [s] a command counts for no longer than this
 
@@ -68,7 +74,7 @@ def input_figures(
         effort[name] = (
             np.sqrt((held[given] * (known - centre) ** 2).sum() / time) if is_known else None
         )
-        variation[name] = np.abs(np.diff(known)).sum() / time if is_known else None
+        variation[_PER_S[name]] = np.abs(np.diff(known)).sum() / time if is_known else None
     figures["input_effort"], figures["input_variation_per_s"] = effort, variation
     figures["saturation"] = _saturation(commands.values, held, limits, missing)
     return figures

@@ -24,7 +24,7 @@ from nmpc_control.analysis.tracking import arrival_figures, reference_figures
 from nmpc_control.analysis.units import units
 from nmpc_control.analysis.windows import scenario_window
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 VEHICLE_RADIUS = 0.5  # [m] hull of the M100: 650 mm diagonal and 13 inch propellers
 
 
