@@ -14,7 +14,7 @@ from nmpc_control.analysis.metrics import flight_metrics
 from nmpc_control.analysis.options import PROGRAM, parser
 from nmpc_control.analysis.outputs import Files, Flight, write
 from nmpc_control.analysis.progress import progress_of
-from nmpc_control.analysis.tables import as_text, segments_as_text
+from nmpc_control.analysis.tables import as_text, segments_as_text, title
 from nmpc_control.errors import BagError, ConfigError
 
 
@@ -35,7 +35,7 @@ def main(argv: Optional[Sequence[str]] = None) -> None:
     has_failed |= also_failed
     everything = baseline + flights
     if everything:
-        comparisons = _comparison(baseline, flights)
+        comparisons = _comparison(baseline, flights, arguments.vehicle_radius)
         if not arguments.quiet:
             _print(everything, comparisons, len(baseline))
         has_failed |= not _write(arguments, everything, comparisons)
@@ -64,14 +64,14 @@ def _read(arguments: argparse.Namespace, paths: Sequence[Path]) -> Tuple[List[Fl
 
 
 def _comparison(
-    baseline: List[Flight], flights: List[Flight]
+    baseline: List[Flight], flights: List[Flight], radius: float
 ) -> Optional[List[compare.Comparison]]:
     """Return the differences to the baseline; without one, of a second flight to the first."""
     if not baseline and len(flights) == 2:
         baseline, flights = flights[:1], flights[1:]
     if not baseline or not flights:
         return None
-    return compare.compare(*([f.record for f in side] for side in (baseline, flights)))
+    return compare.compare(*([f.record for f in side] for side in (baseline, flights)), radius)
 
 
 def _print(
@@ -83,7 +83,7 @@ def _print(
         sys.stdout.write(segments_as_text(figures))
     if comparisons:
         count = count or 1
-        names = [", ".join(m["bag"] for m in side) for side in (metrics[count:], metrics[:count])]
+        names = [", ".join(title(m) for m in side) for side in (metrics[count:], metrics[:count])]
         sys.stdout.write("\n" + compare.as_text(comparisons, *names))
 
 
