@@ -133,6 +133,9 @@ def test_without_a_guard_the_transmitters_switch_tells():
     record = FlightRecord(rc=Series(times, rc), airborne=(2.0, 18.0))
     found = [(round(p.start), round(p.end), p.automatic) for p in periods(record)]
     assert found == [(0, 2, None), (2, 12, True), (12, 18, False), (18, 20, None)]
+    metrics = flight_metrics(replace(record, automatic=record.airborne))
+    assert metrics["automatic_time_s"] == pytest.approx(10.0, abs=0.03)
+    assert metrics["total_time_s"] == metrics["automatic_time_s"]
 
 
 @pytest.fixture(scope="module")

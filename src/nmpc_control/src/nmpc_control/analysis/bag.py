@@ -216,7 +216,10 @@ def _automatic(
     if period is None:
         if airborne is None or flight_status is None:
             return None
-        missing.append("no nmpc/status of this flight: total time is the time in the air")
+        missing.append(
+            "no nmpc/status of this flight: total time is the time in the air, without what the "
+            "transmitter's switch kept by hand"
+        )
         return airborne
     if period[1] >= status.times[-1]:
         missing.append("the bag ends before the landing did: total time is up to its end")

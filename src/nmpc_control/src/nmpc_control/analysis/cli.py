@@ -14,7 +14,7 @@ from nmpc_control.analysis.metrics import flight_metrics
 from nmpc_control.analysis.options import PROGRAM, parser
 from nmpc_control.analysis.outputs import Files, Flight, write
 from nmpc_control.analysis.progress import progress_of
-from nmpc_control.analysis.tables import as_text, segments_as_text, title
+from nmpc_control.analysis.tables import as_text, name_of, segments_as_text
 from nmpc_control.errors import BagError, ConfigError
 
 
@@ -83,7 +83,7 @@ def _print(
         sys.stdout.write(segments_as_text(figures))
     if comparisons:
         count = count or 1
-        names = [", ".join(title(m) for m in side) for side in (metrics[count:], metrics[:count])]
+        names = [", ".join(name_of(m) for m in side) for side in (metrics[count:], metrics[:count])]
         sys.stdout.write("\n" + compare.as_text(comparisons, *names))
 
 

@@ -22,7 +22,8 @@ from nmpc_control.analysis.streams import battery_figures, stream_figures
 from nmpc_control.analysis.timeline import timeline_figures
 from nmpc_control.analysis.tracking import arrival_figures, reference_figures
 from nmpc_control.analysis.units import units
-from nmpc_control.analysis.windows import scenario_window
+from nmpc_control.analysis.windows import mode_runs, scenario_window
+from nmpc_control.mode_inputs import AUTOMATIC
 
 SCHEMA_VERSION = 3
 VEHICLE_RADIUS = 0.5  # [m] hull of the M100: 650 mm diagonal and 13 inch propellers
@@ -74,6 +75,9 @@ def flight_metrics(
     metrics.update(stream_figures(record, window, missing))
     metrics.update(battery_figures(record, window, missing))
     metrics.update(timeline_figures(record, missing))
+    is_guarded = bool(mode_runs(record.status, AUTOMATIC))
+    if not is_guarded and metrics["automatic_time_s"] is not None:  # what the switch told
+        metrics["total_time_s"] = metrics["automatic_time_s"]
     if segments is not None:
         found = parts(record, segments)
         metrics["segments"] = segment_figures(record, found, vehicle_radius, limits)

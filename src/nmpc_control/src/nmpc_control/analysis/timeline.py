@@ -34,7 +34,20 @@ class Period(NamedTuple):
 
 
 def periods(record: FlightRecord) -> List[Period]:
-    """Return the parts of a bag by mode; from the transmitter's switch where no guard told."""
+    """Return the parts of a flight by mode; from the transmitter's switch where no guard told.
+
+    Of the only flight of a bag they are those of the whole bag, on the ground too.
+    """
+    found = _of_bag(record)
+    spans = [span for span in (record.automatic, record.airborne) if span is not None]
+    if record.flight[1] <= 1 or not spans:
+        return found
+    first, last = min(span[0] for span in spans), max(span[1] for span in spans)
+    inside = [p._replace(start=max(p.start, first), end=min(p.end, last)) for p in found]
+    return [p for p in inside if p.start < p.end]
+
+
+def _of_bag(record: FlightRecord) -> List[Period]:
     if record.status is not None and len(record.status):
         return _of_status(record.status)
     if record.rc is not None and len(record.rc):
