@@ -50,7 +50,8 @@ def test_tum_of_one_flight_and_of_several(bags, tmp_path):
 
 
 def test_all_flights_of_a_bag(bags, tmp_path):
-    run(bags["both"], "--flight", "all", "--quiet", "--json", tmp_path / "both.json")
+    shown = run(bags["both"], "--flight", "all", "--json", tmp_path / "both.json").stdout
+    assert "both.bag (2/2) compared with both.bag (1/2)" in shown
     found = json.loads((tmp_path / "both.json").read_text())
     assert [f["flight"] for f in found] == [1, 2]
     assert [f["average_deviation_m"] for f in found] == pytest.approx([0.25, 0.65])
