@@ -122,3 +122,6 @@ def test_without_a_reference_or_positions(record, tmp_path):
     bare = FlightRecord(position=record.position, true_position=record.position)
     assert write_tum(bare, tmp_path) == ["estimate.tum", "truth.tum"]
     assert write_tum(FlightRecord(), tmp_path / "none") == []
+    beyond = replace(record, between=(500.0, 600.0))
+    assert write_tum(beyond, tmp_path / "none") == []
+    assert not (tmp_path / "none").exists()
