@@ -141,6 +141,12 @@ def test_two_trajectories_in_one_bag(tmp_path):
     assert (one["flight"], one["scenario"]) == (1, "first")
     assert one["average_deviation_m"] == pytest.approx(0.25, abs=1e-9)
     assert list(one["clearance_m"]) == ["ball", "far"]
+    for figures in (one, last):
+        assert sum(figures["mode_time_s"].values()) == pytest.approx(24.0, abs=0.1)
+        assert figures["automatic_time_s"] == pytest.approx(figures["total_time_s"], abs=0.05)
+    assert one["timeline"][-1]["end"] < last["timeline"][0]["start"]
+    by_mode = flight_metrics(read_flight(path), segments="mode")["segments"]
+    assert by_mode[0]["start_s"] >= last["timeline"][0]["start"]
     with pytest.raises(BagError, match="has 2 flights, expected at least 3"):
         read_flight(path, flight=3)
 

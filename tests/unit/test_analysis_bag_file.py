@@ -5,6 +5,7 @@ import bz2
 import struct
 
 import lz4.frame
+import numpy as np
 import pytest
 from analysis_bags import BagBuilder, Flight
 from hypothesis import HealthCheck, given, settings
@@ -78,6 +79,20 @@ def test_without_an_index_nothing_is_lost(bag, content, folder):
     figures, whole = flight_metrics(read_flight(path)), flight_metrics(read_flight(bag))
     assert figures.pop("missing") == remarks
     assert {**figures, "bag": None, "missing": []} == {**whole, "bag": None}
+
+
+@pytest.mark.parametrize("is_indexed", [True, False])
+def test_clock_that_starts_at_zero(is_indexed, folder):
+    builder = BagBuilder(delay=0.0)
+    for k in range(100):
+        builder.odometry("nmpc/odometry", k / 50.0, (k / 50.0, 0.0, 2.0), (1.0, 0.0, 0.0))
+    path = builder.write(folder / f"zero{is_indexed}.bag")
+    if not is_indexed:
+        stored(path, without_index(path.read_bytes()))
+    record = read_flight(path)
+    assert record.start_time == 0.0
+    assert record.position.times == pytest.approx(np.arange(100) / 50.0, abs=1e-9)
+    assert flight_metrics(record)["path_length_m"] == pytest.approx(1.98)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.99])

@@ -4,8 +4,11 @@
 import numpy as np
 import pytest
 
-from nmpc_control.analysis.clearance import clearance
-from nmpc_control.analysis.record import ObstacleTrack, Series
+from nmpc_control.analysis.clearance import clearance, clearance_figures
+from nmpc_control.analysis.obstacle_tracks import obstacle_tracks
+from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Series
+from nmpc_control.analysis.recording import Event
+from nmpc_control.analysis.windows import Window
 from nmpc_control.state import Obstacle
 
 HULL = 0.5
@@ -79,3 +82,49 @@ def test_obstacle_counts_only_while_it_is_there():
     track = ObstacleTrack(SPHERE, begin=1.0, end=2.0)
     assert clearance(flown, track, HULL) == pytest.approx(3.0 - 0.6 - 0.5, abs=1e-9)
     assert clearance(flown, ObstacleTrack(SPHERE, begin=7.0), HULL) is None
+
+
+def seen(*observations):
+    """Return messages of a car of 0.3 m, each of (time, y, velocity along y), 5 m ahead."""
+    messages = []
+    for t, y, speed in observations:
+        velocity = np.array([0.0, speed, 0.0])
+        car = Obstacle("car", np.array([5.0, y, 0.0]), np.array([0.3]), "sphere", velocity)
+        messages.append(Event(t, t, [car]))
+    return messages
+
+
+@pytest.mark.parametrize(
+    "observations",
+    [
+        [(0.0, -10.0, 1.0), (1.0, -9.0, 1.0)],  # then silence: it is at y = 0 after 10 s
+        [(19.0, 9.0, 1.0), (20.0, 10.0, 1.0)],  # found late: it was there after 10 s
+        [(0.0, -10.0, 1.0)],
+        [(8.0, -3.0, 1.0), (9.0, -1.0, 1.0)],  # went at 2 m/s in between, then slows to 1 m/s
+    ],
+)
+def test_moving_obstacle_goes_on_where_nobody_observes_it(observations):
+    flown = path([[0, 0, 0], [10, 0, 0]], np.array([0.0, 20.0]))
+    flown = Series(np.arange(0.0, 20.01, 0.1), flown.at(np.arange(0.0, 20.01, 0.1)))
+    tracks = obstacle_tracks(seen(*observations), 0.0, 20.0)
+    missing = []
+    record = FlightRecord(true_position=flown, obstacles=tracks, automatic=(0.0, 20.0))
+    figures = clearance_figures(record, Window(0.0, 20.0, 20.0), HULL, missing)
+    assert figures["clearance_m"]["car"] == pytest.approx(-0.8, abs=1e-6)
+    assert figures["collisions"] == 1
+    assert any("moving obstacles (car) were not observed for up to" in s for s in missing)
+
+
+def test_velocity_before_the_first_observation_is_the_first_one():
+    (track,) = obstacle_tracks(seen((2.0, 4.0, 1.0), (3.0, 5.0, -2.0)), 0.0, 9.0)
+    assert track.centre_at(np.array([0.0, 2.5, 5.0]))[:, 1] == pytest.approx([2.0, 4.5, 1.0])
+
+
+def test_obstacle_that_is_observed_all_the_time_has_no_remark():
+    times = np.arange(0.0, 20.01, 0.1)
+    flown = Series(times, np.zeros((len(times), 3)))
+    tracks = obstacle_tracks(seen(*((t, t - 10.0, 1.0) for t in times)), 0.0, 20.0)
+    record = FlightRecord(true_position=flown, obstacles=tracks, automatic=(0.0, 20.0))
+    missing = []
+    clearance_figures(record, Window(0.0, 20.0, 20.0), HULL, missing)
+    assert missing == []

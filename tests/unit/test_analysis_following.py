@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from analysis_bags import BagBuilder, Flight
+from analysis_bags import BagBuilder, Flight, header
 
 from nmpc_control.analysis.bag import read_flight
 from nmpc_control.analysis.following import following_figures, track_errors
@@ -68,13 +68,24 @@ def test_time_in_saturation_and_effort():
     assert saturation["share"] == pytest.approx(2.98 / 9.98)
     expected = np.sqrt((2.0 * 0.349**2 + 7.98 * 0.1**2) / 9.98)
     assert figures["input_effort"]["roll_rad"] == pytest.approx(expected)
-    assert figures["input_variation_per_s"]["roll_rad"] == pytest.approx(0.249 / 9.98)
+    assert figures["input_variation_per_s"]["roll_rad_s"] == pytest.approx(0.249 / 9.98)
 
 
 def test_inputs_that_are_not_commanded_count_nowhere():
     figures = input_figures(commands(np.full(50, np.nan), 0.1, 0.0, 0.0), WHOLE, InputLimits(), [])
     assert figures["input_effort"]["thrust_percent"] is None
     assert figures["saturation"]["thrust_percent_time_s"] == 0.0
+
+
+def test_commands_beyond_the_assumed_bounds_disprove_them():
+    missing = []
+    thrust = np.where(np.arange(500) < 5, 71.0, 60.0)
+    figures = input_figures(commands(thrust, 0.349, 0.0, 0.0), WHOLE, InputLimits(), missing)
+    saturation = figures["saturation"]
+    assert [saturation[key] for key in ("thrust_percent_time_s", "time_s", "share")] == [None] * 3
+    assert saturation["roll_rad_time_s"] == pytest.approx(9.98)
+    assert "commands from 60 to 71 exceed the assumed bounds 30 to 60" in missing[0]
+    assert len(missing) == 1
 
 
 def test_jerk_of_a_cubic_velocity_is_exact():
@@ -122,6 +133,9 @@ def test_without_a_guard_the_transmitters_switch_tells():
     record = FlightRecord(rc=Series(times, rc), airborne=(2.0, 18.0))
     found = [(round(p.start), round(p.end), p.automatic) for p in periods(record)]
     assert found == [(0, 2, None), (2, 12, True), (12, 18, False), (18, 20, None)]
+    metrics = flight_metrics(replace(record, automatic=record.airborne))
+    assert metrics["automatic_time_s"] == pytest.approx(10.0, abs=0.03)
+    assert metrics["total_time_s"] == metrics["automatic_time_s"]
 
 
 @pytest.fixture(scope="module")
@@ -173,6 +187,27 @@ def test_streams_battery_and_units(flight):
     assert metrics["units"]["rate_hz"] == "Hz"
     assert metrics["units"]["jerk_m_s3"] == "m/s^3"
     assert metrics["units"]["average_deviation_m"] == "m"
+    per_second = {key: metrics["units"][key] for key in metrics["input_variation_per_s"]}
+    assert per_second == {
+        "thrust_percent_s": "percent/s",
+        "roll_rad_s": "rad/s",
+        "pitch_rad_s": "rad/s",
+        "yaw_rate_rad_s2": "rad/s^2",
+    }
+    assert "input_variation_per_s" not in metrics["units"]
+    assert metrics["units"]["yaw_rate_rad_s"] == "rad/s"
+    assert metrics["units"]["roll_rad_time_s"] == "s"
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.01])
+def test_charge_as_a_share_of_1_is_shown_in_percent(scale, tmp_path):
+    bag = BagBuilder()
+    for t in (100.0, 101.0, 102.0):
+        values = {"header": header(t), "percentage": scale * (150.0 - t)}
+        bag.add("dji_sdk/battery_state", "sensor_msgs/msg/BatteryState", t, values)
+    record = read_flight(bag.write(tmp_path / "battery.bag"))
+    assert record.battery.values[:, 0] == pytest.approx([50.0, 49.0, 48.0])
+    assert ("battery_state is taken as a share of 1" in record.missing) == (scale < 1.0)
 
 
 def test_hover_thrust_is_that_of_standing_still_not_of_passing_through():

@@ -134,6 +134,23 @@ def test_solver_figures_are_those_of_the_scenario():
     assert (metrics["plans_rejected"], metrics["deadline_misses"]) == (30, 60)
 
 
+def test_counters_of_a_guard_that_restarted_are_summed():
+    changes = status((42.0, 2), (46.0, 3), (80.0, 6))
+    values = changes.values.copy()
+    values[changes.times >= 60.0, 1:] -= [58.0, 120.0]  # one is 2 again, the other 0
+    restarted = flight_metrics(record(status=Series(changes.times, values)))
+    assert (restarted["plans_rejected"], restarted["deadline_misses"]) == (9 + 2 + 20, 18 + 40)
+    assert any("guard restarted" in sentence for sentence in restarted["missing"])
+
+
+def test_what_is_held_before_the_reference_runs_is_no_deviation():
+    by_time = flight_metrics(record(automatic=(42.0, 85.0)), segments="mode")["segments"]
+    takeoff = next(part for part in by_time if part["end_s"] <= START)
+    assert takeoff["average_deviation_retimed_m"] is None
+    assert takeoff["maximum_deviation_retimed_m"] is None
+    assert any(part["average_deviation_retimed_m"] for part in by_time)
+
+
 def test_thrust_range_leaves_out_what_no_command_gave():
     times = np.arange(START, 80.0, 0.02)
     values = np.full((len(times), 4), np.nan)
@@ -238,6 +255,7 @@ OPTIONAL = {  # nothing to explain
     "reported_collisions",
     "rc",
     "parameters",
+    "between",
 }
 
 

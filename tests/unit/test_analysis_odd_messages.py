@@ -7,6 +7,7 @@ from analysis_bags import FLYING, BagBuilder, Flight
 
 from nmpc_control.analysis.bag import read_flight
 from nmpc_control.analysis.metrics import flight_metrics
+from nmpc_control.analysis.recording import read
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +65,8 @@ def test_meaning_of_a_setpoint_is_in_its_flag(tmp_path):
     np.testing.assert_allclose(record.commands.values, expected, atol=1e-6)
     figures = flight_metrics(record)
     assert figures["thrust_percent"] == pytest.approx([37.0, 37.0])
-    assert figures["command_gap_ms_max"] == pytest.approx(500.0, abs=1e-3)
+    # 980 ms from the last of them to the last status
+    assert figures["command_gap_ms_max"] == pytest.approx(980.0, abs=1e-3)
 
 
 def test_setpoints_without_meaning_are_counted(flight, tmp_path):
@@ -114,3 +116,38 @@ def test_stamps_of_another_clock_are_named(flight, tmp_path):
     missing = " ".join(read_flight(builder.write(tmp_path / "clock.bag")).missing)
     assert "dji_sdk/battery_state: stamps are 100.0 s from the time of recording" in missing
     assert "odometry" not in missing
+
+
+@pytest.mark.parametrize("wrong", [2.1e9, 1.0, 130.0])
+def test_single_wrong_stamps_change_nothing_and_are_named(wrong, flight, metrics, tmp_path):
+    builder = flight.without("nothing")
+    odd = BagBuilder()
+    odd.odometry("nmpc/odometry", wrong, (5.0, 0.25, 2.0), (1.0, 0.0, 0.0), yaw=1.0)
+    odd.status(wrong, FLYING, plans_rejected=11, deadline_misses=115, reason="of another length")
+    odd.setpoint(wrong, 0.1, -0.1, 38.0, 0.2)
+    builder.messages += [(topic, kind, 115.0, raw) for topic, kind, _, raw in odd.messages]
+    figures = flight_metrics(read_flight(builder.write(tmp_path / "stamp.bag")))
+    names = ("nmpc/odometry", "nmpc/status", "dji_sdk/flight_control_setpoint_generic")
+    said = [s for s in figures["missing"] if "the time of recording counts" in s]
+    assert sorted(s.split(":")[0] for s in said) == sorted(names)
+    assert all(": 1 stamps are over 5 s from all others'" in s for s in said)
+    assert len(figures["missing"]) == 3
+    for key in ("average_deviation_m", "navigation_time_s", "total_time_s", "window_s"):
+        assert figures[key] == pytest.approx(metrics[key], rel=1e-3), key
+    assert figures["command_gap_ms_max"] == pytest.approx(metrics["command_gap_ms_max"], abs=0.1)
+    assert figures["streams"]["nmpc/odometry"]["gap_ms_max"] == pytest.approx(20.0, abs=0.1)
+
+
+def test_obstacles_that_stand_still_are_held_once(tmp_path):
+    builder = BagBuilder()
+    for k in range(50):
+        standing = [(f"tree{i}", (10.0 + i, 0.0, 3.0), 1.0) for i in range(20)]
+        builder.obstacles(0.1 * k, [*standing, ("bird", (0.1 * k, 0.0, 3.0), 0.2)])
+        builder.obstacles(0.1 * k, standing, topic="obstacles")
+    recording = read(builder.write(tmp_path / "trees.bag"))
+    assert "sensed_obstacles" not in recording.events
+    contents = [event.content for event in recording.events["obstacles"]]
+    assert [len(content) for content in contents] == [21] * 50
+    assert len({id(obstacle) for content in contents for obstacle in content}) == 20 + 50
+    birds = np.array([content[-1].position[0] for content in contents])
+    np.testing.assert_allclose(birds, 0.1 * np.arange(50))

@@ -31,8 +31,9 @@ def bags(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bags")
     good, bad = Flight().build(name="line"), Worse().build(name="line")
     paths = {"good": good.write(folder / "good.bag"), "bad": bad.write(folder / "bad.bag")}
-    good.messages = good.messages + bad.messages
-    return {**paths, "both": good.write(folder / "both.bag")}
+    both = good.without("nothing")
+    both.messages += bad.messages
+    return {**paths, "both": both.write(folder / "both.bag"), "builder": good}
 
 
 def test_tum_of_one_flight_and_of_several(bags, tmp_path):
@@ -49,7 +50,8 @@ def test_tum_of_one_flight_and_of_several(bags, tmp_path):
 
 
 def test_all_flights_of_a_bag(bags, tmp_path):
-    run(bags["both"], "--flight", "all", "--quiet", "--json", tmp_path / "both.json")
+    shown = run(bags["both"], "--flight", "all", "--json", tmp_path / "both.json").stdout
+    assert "both.bag (2/2) compared with both.bag (1/2)" in shown
     found = json.loads((tmp_path / "both.json").read_text())
     assert [f["flight"] for f in found] == [1, 2]
     assert [f["average_deviation_m"] for f in found] == pytest.approx([0.25, 0.65])
@@ -148,9 +150,18 @@ def test_layout_names_topics_that_a_flight_has(bags):
     assert {"/" + "/".join(name.split("/")[1:3]) for name in curves} == selected
 
 
-def test_example_of_the_documentation_runs(bags, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    "absent",
+    [
+        (),
+        ("nmpc/odometry",),
+        ("nmpc/odometry", "uav_sim/ground_truth", "nmpc/trajectory"),
+        ("flight_status", "nmpc/trajectory"),
+    ],
+)
+def test_example_of_the_documentation_runs(absent, bags, tmp_path, monkeypatch):
     (code,) = re.findall(r"```python\n(.*?)```", EXAMPLE.read_text(encoding="utf-8"), re.S)
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "flight.bag").write_bytes(bags["good"].read_bytes())
+    bags["builder"].without(*absent, "nothing").write(tmp_path / "flight.bag")
     exec(compile(code, str(EXAMPLE), "exec"), {})  # our own documentation
     assert (tmp_path / "height.pdf").read_bytes().startswith(b"%PDF-")

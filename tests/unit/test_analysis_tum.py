@@ -3,13 +3,17 @@
 
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from nmpc_control.analysis.compare import compare
 from nmpc_control.analysis.metrics import flight_metrics
 from nmpc_control.analysis.quaternions import from_rpy, rpy_of
 from nmpc_control.analysis.record import FlightRecord, Reference, Series
+from nmpc_control.analysis.segments import parts
+from nmpc_control.analysis.timeline import shown_window
 from nmpc_control.analysis.tum import write_tum
 
 EPOCH = 1_700_000_000.25
@@ -95,7 +99,29 @@ def test_ape_is_what_evo_prints_now(record, folder):
     assert ape == pytest.approx({key: float(printed[key]) for key in ape}, abs=1e-6)
 
 
+def test_part_of_the_time_is_the_same_part_everywhere(record, tmp_path):
+    chosen = replace(record, between=(20.0, 25.0))
+    write_tum(chosen, tmp_path)
+    table = np.loadtxt(tmp_path / "estimate.tum")
+    assert EPOCH + 20.0 <= table[0, 0] < table[-1, 0] <= EPOCH + 25.0
+    deviation = np.linalg.norm(
+        table[:, 1:4] - np.loadtxt(tmp_path / "reference.tum")[:, 1:4], axis=1
+    )
+    ape = flight_metrics(record, between=(20.0, 25.0))["ape_m"]
+    assert ape["mean"] == pytest.approx(deviation.mean(), abs=1e-6)
+    assert flight_metrics(chosen)["ape_m"] == ape
+    window = shown_window(chosen)
+    assert (window.start, window.end) == (20.0, 25.0)
+    found = parts(chosen, "2")
+    assert (found[0].start, found[-1].end) == (20.0, 25.0)
+    rows = compare([chosen], [chosen])
+    assert rows[0].baseline == pytest.approx(ape["mean"])
+
+
 def test_without_a_reference_or_positions(record, tmp_path):
     bare = FlightRecord(position=record.position, true_position=record.position)
     assert write_tum(bare, tmp_path) == ["estimate.tum", "truth.tum"]
     assert write_tum(FlightRecord(), tmp_path / "none") == []
+    beyond = replace(record, between=(500.0, 600.0))
+    assert write_tum(beyond, tmp_path / "none") == []
+    assert not (tmp_path / "none").exists()

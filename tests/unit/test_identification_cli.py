@@ -193,6 +193,9 @@ def test_flight_that_excites_nothing_gives_reasons_and_no_zeros(tmp_path):
 
 def test_options_that_make_no_sense_are_one_line(bag, tmp_path):
     complains(run(bag, "--fit", 9, 5), "--fit", "earlier")
+    complains(run(bag, "--fit", 8000, 9000), str(bag), "--fit", "expected a part of")
+    complains(run(bag, "--fit", 5, 20, "--validate", 8000, 9000), "--validate", "a part of")
+    complains(run(bag, "--validate", 5, 9), "--validate", "expected --fit too")
     complains(run(bag, bag), "twice")
     complains(run(bag, tmp_path / "other.bag", "--fit", 1, 9), "one bag")
     complains(run(bag, "--regime", "limited", "--write", tmp_path / "x.yaml"), "--regime limited")

@@ -9,7 +9,13 @@ import numpy as np
 from nmpc_control.analysis import recording as reading
 from nmpc_control.analysis.messages import POSITION, QUATERNION, VELOCITY
 from nmpc_control.analysis.obstacle_tracks import obstacle_tracks
-from nmpc_control.analysis.other_topics import goals, other_position, published_reference, stamps
+from nmpc_control.analysis.other_topics import (
+    battery_percent,
+    goals,
+    other_position,
+    published_reference,
+    stamps,
+)
 from nmpc_control.analysis.quaternions import rpy_of, to_world
 from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Reference, Series
 from nmpc_control.analysis.recording import Event, Progress, Recording
@@ -100,7 +106,7 @@ def _record(bag: str, recording: Recording, number: int) -> FlightRecord:
         phase_end=_next_trajectory(trajectories, start),
         reported_collisions=_collisions(recording, automatic),
         rc=recording.rows.get("rc"),
-        battery=recording.rows.get("battery"),
+        battery=battery_percent(recording.rows.get("battery"), missing),
         stamps=stamps(recording),
         goals=goals(recording),
         log=tuple((e.time, *e.content) for e in recording.events.get("log", ())),
@@ -210,7 +216,10 @@ def _automatic(
     if period is None:
         if airborne is None or flight_status is None:
             return None
-        missing.append("no nmpc/status of this flight: total time is the time in the air")
+        missing.append(
+            "no nmpc/status of this flight: total time is the time in the air, without what the "
+            "transmitter's switch kept by hand"
+        )
         return airborne
     if period[1] >= status.times[-1]:
         missing.append("the bag ends before the landing did: total time is up to its end")

@@ -55,7 +55,7 @@ class BagFile:
         self.remarks: List[str] = []
         self._found: Dict[int, Tuple[str, str, str]] = {}
         self._counts: Dict[int, int] = {}
-        self.start_time: Optional[int] = None  # [ns]
+        self.start_time = 0  # [ns] of the first message; 0 is a time too: simulations begin there
         self._file: BinaryIO = path.open("rb")
         self._size = path.stat().st_size
         try:
@@ -93,7 +93,7 @@ class BagFile:
         if not position or not len(MAGIC) < position < self._size:
             self.remarks.append("the bag has no index (its recorder did not end): read as it lies")
             return False
-        starts = []
+        starts, used = [], []  # of all chunks, of those with messages
         while position < self._size:
             record = self._record(position, with_data=True)
             if record is None:
@@ -102,9 +102,12 @@ class BagFile:
                 self._add_connection(record.fields, record.data)
             elif record.operation == CHUNK_INFO:
                 starts.append(_number(record.fields, b"start_time", 8))
+                messages = 0
                 for at in range(0, len(record.data) - 7, 8):
                     identifier, count = u32(record.data, at), u32(record.data, at + 4)
                     self._counts[identifier] = self._counts.get(identifier, 0) + count
+                    messages += count
+                used += starts[-1:] if messages else []
             position = record.end
         expected = (
             _number(header.fields, b"conn_count", 4),
@@ -114,19 +117,20 @@ class BagFile:
             self.remarks.append("the bag's index is damaged: read as it lies")
             self._found, self._counts = {}, {}
             return False
-        used = [start for start in starts if start]
-        self.start_time = min(map(_nanoseconds, used)) if used else None
+        self.start_time = min(map(_nanoseconds, used), default=0)
         return True
 
     def _scan(self) -> None:
         """Find connections, counts and the start without an index."""
+        first: Optional[int] = None
         for chunk in self._chunks(is_remarked=False):
             for record in records_of(chunk):
                 if record.operation == CONNECTION:
                     self._add_connection(record.fields, record.data)
             for identifier, time, _ in messages_of(chunk):
                 self._counts[identifier] = self._counts.get(identifier, 0) + 1
-                self.start_time = time if self.start_time is None else min(self.start_time, time)
+                first = time if first is None else min(first, time)
+        self.start_time = first or 0
 
     def _add_connection(self, fields: Fields, data: bytes) -> None:
         identifier, inner = _number(fields, b"conn", 4), fields_of(data)

@@ -2,14 +2,13 @@
 """Distance between a flown path and the obstacles, between the samples too, and what was hit."""
 
 import math
-from typing import List, Optional
+from typing import List, Optional, Sequence
 
 import numpy as np
 
+from nmpc_control.analysis.gaps import LONGEST_GAP, uncovered
 from nmpc_control.analysis.record import FlightRecord, Metrics, ObstacleTrack, Series
 from nmpc_control.analysis.windows import Window
-
-_LONGEST_GAP = 0.5  # [s] between positions; over longer ones a straight line is a guess
 
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 _BISECTIONS = 60  # shrink a segment by 0.618 each, to 3e-13 of its length
@@ -72,11 +71,19 @@ def clearance_figures(
         missing.append("no positions: no clearance")
         return figures
     flown = position.between(window.start, window.end)
-    if len(flown) > 1 and np.diff(flown.times).max() > _LONGEST_GAP:
+    lost = uncovered(flown.times, window.start, window.end)
+    if len(flown) > 1 and np.diff(flown.times).max() > LONGEST_GAP:
+        lost -= uncovered(flown.times, flown.times[0], flown.times[-1])
         gap = np.diff(flown.times).max()
         missing.append(
             f"positions are missing for up to {gap:.1f} s: clearance there is along a straight line"
         )
+    if lost > 0.0:
+        missing.append(
+            f"positions are missing for {lost:.1f} s before the first or after the last: "
+            "no clearance there"
+        )
+    _say_unobserved(record.obstacles, window, missing)
     figures["clearance_m"] = {t.obstacle.id: clearance(flown, t, radius) for t in record.obstacles}
     figures["clearance_by"] = "truth" if record.true_position is not None else "estimate"
     if record.true_position is None:
@@ -87,6 +94,21 @@ def clearance_figures(
     touched = sum(_is_touched(whole, track, radius) for track in record.obstacles)
     figures["collisions"] = max(touched, record.reported_collisions or 0)
     return figures
+
+
+def _say_unobserved(tracks: Sequence[ObstacleTrack], window: Window, missing: List[str]) -> None:
+    """Name the moving obstacles that were guessed rather than observed for a part of the window."""
+    lost = {}
+    for track in tracks:
+        start, end = max(window.start, track.begin), min(window.end, track.end)
+        if track.observed is not None and start < end:
+            lost[track.obstacle.id] = uncovered(track.observed, start, end)
+    names = ", ".join(name for name, seconds in lost.items() if seconds > 0.0)
+    if names:
+        missing.append(
+            f"moving obstacles ({names}) were not observed for up to {max(lost.values()):.1f} s: "
+            "clearance there is to where their velocity takes them"
+        )
 
 
 def _is_touched(position: Series, track: ObstacleTrack, radius: float) -> bool:

@@ -3,6 +3,7 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import List, Optional, Sequence, Tuple
 
@@ -13,7 +14,7 @@ from nmpc_control.analysis.metrics import flight_metrics
 from nmpc_control.analysis.options import PROGRAM, parser
 from nmpc_control.analysis.outputs import Files, Flight, write
 from nmpc_control.analysis.progress import progress_of
-from nmpc_control.analysis.tables import as_text, segments_as_text
+from nmpc_control.analysis.tables import as_text, name_of, segments_as_text
 from nmpc_control.errors import BagError, ConfigError
 
 
@@ -34,7 +35,7 @@ def main(argv: Optional[Sequence[str]] = None) -> None:
     has_failed |= also_failed
     everything = baseline + flights
     if everything:
-        comparisons = _comparison(baseline, flights)
+        comparisons = _comparison(baseline, flights, arguments.vehicle_radius)
         if not arguments.quiet:
             _print(everything, comparisons, len(baseline))
         has_failed |= not _write(arguments, everything, comparisons)
@@ -53,27 +54,24 @@ def _read(arguments: argparse.Namespace, paths: Sequence[Path]) -> Tuple[List[Fl
             _complain(f"{path}: {error}")
             has_failed = True
             continue
-        for record in records:
+        for read in records:
+            record = replace(read, between=arguments.between and tuple(arguments.between))
             metrics = flight_metrics(
-                record,
-                arguments.vehicle_radius,
-                arguments.limits,
-                arguments.segments,
-                arguments.between,
+                record, arguments.vehicle_radius, arguments.limits, arguments.segments
             )
             flights.append(Flight(path, record, metrics))
     return flights, has_failed
 
 
 def _comparison(
-    baseline: List[Flight], flights: List[Flight]
+    baseline: List[Flight], flights: List[Flight], radius: float
 ) -> Optional[List[compare.Comparison]]:
     """Return the differences to the baseline; without one, of a second flight to the first."""
     if not baseline and len(flights) == 2:
         baseline, flights = flights[:1], flights[1:]
     if not baseline or not flights:
         return None
-    return compare.compare(*([f.record for f in side] for side in (baseline, flights)))
+    return compare.compare(*([f.record for f in side] for side in (baseline, flights)), radius)
 
 
 def _print(
@@ -85,7 +83,7 @@ def _print(
         sys.stdout.write(segments_as_text(figures))
     if comparisons:
         count = count or 1
-        names = [", ".join(m["bag"] for m in side) for side in (metrics[count:], metrics[:count])]
+        names = [", ".join(name_of(m) for m in side) for side in (metrics[count:], metrics[:count])]
         sys.stdout.write("\n" + compare.as_text(comparisons, *names))
 
 

@@ -41,6 +41,7 @@ class Collector:
         self._events: Dict[str, List[Event]] = {}
         self._unusable: Dict[str, int] = {}
         self._offsets: Dict[str, float] = {}  # [s] between stamps and recording
+        self._wrong: Dict[str, int] = {}  # stamps that cannot be
 
     def add(self, connection_id: int, time: int, raw: bytes) -> None:
         """Take one raw message, recorded at a time [ns]."""
@@ -67,6 +68,12 @@ class Collector:
                 found[role] = times, values
         for role, count in self._unusable.items():
             remarks.append(f"{_name(role)}: {count} messages cannot be used: left out")
+        for role, count in self._wrong.items():
+            if count:
+                remarks.append(
+                    f"{_name(role)}: {count} stamps are over {_LARGEST_OFFSET:.0f} s from all "
+                    "others': the time of recording counts"
+                )
         for role, offset in self._offsets.items():
             if offset > _LARGEST_OFFSET:
                 remarks.append(
@@ -118,7 +125,7 @@ class Collector:
         columns, rows_of = ROWS[role]
         decoder = self._decoders[connection_id]
         recorded, messages = self._pending.pop(connection_id)
-        used = 0
+        found = []
         for numbers, batch in batches(decoder.fields, decoder.msgtype, messages):
             times = np.array(recorded, dtype=np.int64)[numbers]
             try:
@@ -126,17 +133,34 @@ class Collector:
                 values = _table(rows_of(batch), len(numbers), columns)
             except Exception:  # fields that are absent, or are not numbers
                 continue
-            if stamps is not None:
-                given = stamps != 0
-                if given.any():
-                    offset = abs(float(np.median((stamps - times)[given]))) * 1e-9
-                    self._offsets[role] = max(self._offsets.get(role, 0.0), offset)
-                times = np.where(given, stamps, times)
-            order = np.argsort(numbers)
-            self._rows.setdefault(role, []).append((self._seconds(times[order]), values[order]))
-            used += len(numbers)
+            stamps = np.zeros_like(times) if stamps is None else stamps
+            found.append((numbers, times, stamps, values))
+        used = 0
+        if found:
+            numbers, times, stamps, values = (np.concatenate(column) for column in zip(*found))
+            order, used = np.argsort(numbers), len(numbers)
+            times = self._seconds(self._times(role, times, stamps))
+            self._rows.setdefault(role, []).append((times[order], values[order]))
         if used < len(messages):
             self._unusable[role] = self._unusable.get(role, 0) + len(messages) - used
+
+    def _times(self, role: str, recorded: np.ndarray, stamps: np.ndarray) -> np.ndarray:
+        """Return the stamps (n,) [ns]; the time of recording for those that are absent or wrong.
+
+        Delays vary little: a stamp that is far from what most of them are before the recording is
+        wrong. If most are far there is no common offset: such a clock runs at another speed.
+        """
+        given = stamps != 0
+        if not given.any():
+            return recorded
+        offsets = (stamps - recorded) * 1e-9
+        offset = float(np.median(offsets[given]))
+        self._offsets[role] = max(self._offsets.get(role, 0.0), abs(offset))
+        is_wrong = given & (np.abs(offsets - offset) > _LARGEST_OFFSET)
+        if 2 * is_wrong.sum() < given.sum():
+            self._wrong[role] = self._wrong.get(role, 0) + int(is_wrong.sum())
+            given &= ~is_wrong
+        return np.where(given, stamps, recorded)
 
     def _seconds(self, nanoseconds: Any) -> Any:
         return (nanoseconds - self._start) * 1e-9

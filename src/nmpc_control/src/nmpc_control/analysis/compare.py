@@ -3,16 +3,22 @@
 
 Samples of a flight follow one another, so neighbours tell nearly the same: whole blocks of seconds
 are drawn instead of samples (moving-block bootstrap, H. R. Kuensch, Annals of Statistics 17, 1989).
-With several flights on a side the flights are drawn first: the interval then also holds what
-differs from flight to flight. With one flight it is about these two flights alone.
+Of one flight on a side that is all there is: the interval tells nothing of what differs from flight
+to flight. Several flights on a side are one number each, and their mean is drawn from Student's
+distribution: drawing few flights again and again would give intervals that are far too narrow.
+The difference of two such draws is the Behrens-Fisher interval, which errs on the wide side.
 """
 
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
+from scipy.stats import t as student
 
+from nmpc_control.analysis.clearance import clearance_figures
 from nmpc_control.analysis.deviation import errors, path_deviation
+from nmpc_control.analysis.metrics import VEHICLE_RADIUS
 from nmpc_control.analysis.record import ITERATIONS, SOLVE_TIME, FlightRecord, Metrics, Series
+from nmpc_control.analysis.tracking import arrival_figures
 from nmpc_control.analysis.windows import Window, scenario_window
 
 BLOCK = 2.0  # [s] longer than a deviation remembers
@@ -20,7 +26,10 @@ DRAWS = 2000
 CONFIDENCE = 0.95
 _SEED = 0  # the same bags give the same interval
 
+_RMSE = "root mean square error"
+
 Samples = Callable[[FlightRecord, Window], Optional[Series]]
+Number = Callable[[FlightRecord, Window, float], Optional[float]]  # with the hull's radius [m]
 
 
 class Comparison(NamedTuple):
@@ -31,20 +40,42 @@ class Comparison(NamedTuple):
     baseline: float
     other: float
     difference: float
-    low: float  # bounds of the interval of the difference
-    high: float
+    low: Optional[float]  # bounds of the interval of the difference; None: nothing tells them
+    high: Optional[float]
 
     @property
     def is_clear(self) -> bool:
         """Return whether the interval excludes that nothing changed."""
-        return not self.low <= 0.0 <= self.high
+        return self.low is not None and not self.low <= 0.0 <= self.high
 
 
-def compare(baseline: Sequence[FlightRecord], others: Sequence[FlightRecord]) -> List[Comparison]:
-    """Return the comparison of every figure that both sides have."""
+class _Flight(NamedTuple):
+    """A figure of one flight, with sum and number of the samples of all its moving blocks."""
+
+    value: float
+    blocks: Optional[Tuple[np.ndarray, np.ndarray]] = None  # None: one number, not a mean
+    is_root: bool = False  # the figure is the root of the mean
+
+
+def compare(
+    baseline: Sequence[FlightRecord],
+    others: Sequence[FlightRecord],
+    radius: float = VEHICLE_RADIUS,
+) -> List[Comparison]:
+    """Return the comparison of every figure that both sides have.
+
+    Args:
+        baseline: Flights before.
+        others: Flights after.
+        radius: Hull [m] that clearance counts from.
+    """
     rows = []
     for (figure, unit), samples in _FIGURES.items():
-        sides = [_blocks_of(side, samples) for side in (baseline, others)]
+        sides = [_blocks_of(s, samples, figure in _ROOTS) for s in (baseline, others)]
+        if all(sides):
+            rows.append(_compare(figure, unit, *sides))
+    for (figure, unit), number in _NUMBERS.items():
+        sides = [_numbers_of(side, number, radius) for side in (baseline, others)]
         if all(sides):
             rows.append(_compare(figure, unit, *sides))
     return rows
@@ -53,16 +84,16 @@ def compare(baseline: Sequence[FlightRecord], others: Sequence[FlightRecord]) ->
 def _compare(figure: str, unit: str, baseline: List, others: List) -> Comparison:
     random = np.random.default_rng(_SEED)
     before, after = _mean(baseline), _mean(others)
-    draws = _drawn_means(others, random) - _drawn_means(baseline, random)
-    tail = 50.0 * (1.0 - CONFIDENCE)
-    low, high = np.percentile(draws, (tail, 100.0 - tail))
-    return Comparison(figure, unit, before, after, after - before, float(low), float(high))
+    drawn = [_drawn_means(side, random) for side in (baseline, others)]
+    low = high = None
+    if all(means is not None for means in drawn):
+        tail = 50.0 * (1.0 - CONFIDENCE)
+        low, high = map(float, np.percentile(drawn[1] - drawn[0], (tail, 100.0 - tail)))
+    return Comparison(figure, unit, before, after, after - before, low, high)
 
 
-def _blocks_of(
-    records: Sequence[FlightRecord], samples: Samples
-) -> List[Tuple[np.ndarray, np.ndarray]]:
-    """Return sum and number of the samples of all moving blocks, of every flight that has them."""
+def _blocks_of(records: Sequence[FlightRecord], samples: Samples, is_root: bool) -> List[_Flight]:
+    """Return the figure of every flight that has samples."""
     found = []
     for record in records:
         window = scenario_window(record)
@@ -74,24 +105,36 @@ def _blocks_of(
         last = np.searchsorted(series.times, series.times[-1] - BLOCK, side="right")
         starts = np.arange(max(1, last))
         counts = ends[starts] - starts
-        found.append((total[ends[starts]] - total[starts], counts, total[-1] / len(series)))
+        mean = total[-1] / len(series)
+        blocks = (total[ends[starts]] - total[starts], counts)
+        found.append(_Flight(float(np.sqrt(mean)) if is_root else mean, blocks, is_root))
     return found
 
 
-def _mean(flights: List) -> float:
-    return float(np.mean([mean for _, _, mean in flights]))
+def _numbers_of(records: Sequence[FlightRecord], number: Number, radius: float) -> List[_Flight]:
+    windows = [(record, scenario_window(record)) for record in records]
+    found = [number(record, window, radius) for record, window in windows if window is not None]
+    return [_Flight(float(value)) for value in found if value is not None]
 
 
-def _drawn_means(flights: List, random: np.random.Generator) -> np.ndarray:
-    """Return the mean of every draw (DRAWS,): of flights, and of blocks within each of them."""
-    chosen = random.integers(len(flights), size=(DRAWS, len(flights)))
-    means = np.empty(chosen.shape)
-    for index, (sums, counts, _) in enumerate(flights):
-        slots = chosen == index
-        needed = max(1, int(np.ceil((len(sums) + counts[-1]) / counts.mean())))
-        drawn = random.integers(len(sums), size=(np.count_nonzero(slots), needed))
-        means[slots] = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
-    return means.mean(axis=1)
+def _mean(flights: List[_Flight]) -> float:
+    return float(np.mean([flight.value for flight in flights]))
+
+
+def _drawn_means(flights: List[_Flight], random: np.random.Generator) -> Optional[np.ndarray]:
+    """Return the mean of every draw (DRAWS,); None where one number is all there is."""
+    count = len(flights)
+    if count > 1:
+        spread = np.std([flight.value for flight in flights], ddof=1) / np.sqrt(count)
+        quantiles = student.ppf((np.arange(DRAWS) + 0.5) / DRAWS, count - 1)
+        return _mean(flights) + spread * random.permutation(quantiles)
+    if flights[0].blocks is None:
+        return None
+    sums, counts = flights[0].blocks
+    needed = max(1, int(np.ceil((len(sums) + counts[-1]) / counts.mean())))
+    drawn = random.integers(len(sums), size=(DRAWS, needed))
+    means = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
+    return np.sqrt(means) if flights[0].is_root else means
 
 
 def _deviation(record: FlightRecord, window: Window) -> Optional[Series]:
@@ -99,6 +142,11 @@ def _deviation(record: FlightRecord, window: Window) -> Optional[Series]:
         return None
     error = errors(record.position, record.reference, window.start, window.reference_end)
     return Series(error.times, np.linalg.norm(error.values, axis=1))
+
+
+def _squared_error(record: FlightRecord, window: Window) -> Optional[Series]:
+    deviation = _deviation(record, window)
+    return deviation and Series(deviation.times, deviation.values**2)
 
 
 def _from_path(record: FlightRecord, window: Window) -> Optional[Series]:
@@ -125,12 +173,27 @@ def _solver(column: int, factor: float) -> Samples:
     return samples
 
 
+def _least_clearance(record: FlightRecord, window: Window, radius: float) -> Optional[float]:
+    clearances = clearance_figures(record, window, radius, [])["clearance_m"] or {}
+    return min((c for c in clearances.values() if c is not None), default=None)
+
+
+def _navigation_time(record: FlightRecord, window: Window, _: float) -> Optional[float]:
+    return arrival_figures(record, window, [])["navigation_time_s"]
+
+
 _FIGURES: Dict[Tuple[str, str], Samples] = {
     ("average deviation", "m"): _deviation,
+    (_RMSE, "m"): _squared_error,
     ("average deviation from the path", "m"): _from_path,
     ("average speed", "m/s"): _speed,
     ("average solver iterations", "1"): _solver(ITERATIONS, 1.0),
     ("average solve time", "ms"): _solver(SOLVE_TIME, 1e3),
+}
+_ROOTS = (_RMSE,)
+_NUMBERS: Dict[Tuple[str, str], Number] = {
+    ("least clearance", "m"): _least_clearance,
+    ("navigation time", "s"): _navigation_time,
 }
 
 
@@ -144,9 +207,10 @@ def as_text(rows: Sequence[Comparison], name: str, baseline: str) -> str:
     lines = [f"{name} compared with {baseline} ({CONFIDENCE:.0%} intervals, blocks of {BLOCK:g} s)"]
     for row in rows:
         label = row.figure + ("" if row.unit == "1" else f" [{row.unit}]")
-        word = "clear" if row.is_clear else "not clear"
-        lines.append(
-            f"  {label:<36} {row.baseline:9.3f} -> {row.other:9.3f}   "
-            f"{row.difference:+9.3f}  [{row.low:+.3f}, {row.high:+.3f}]  {word}"
-        )
+        verdict = "one flight: no interval"
+        if row.low is not None:
+            word = "clear" if row.is_clear else "not clear"
+            verdict = f"[{row.low:+.3f}, {row.high:+.3f}]  {word}"
+        numbers = f"{row.baseline:9.3f} -> {row.other:9.3f}   {row.difference:+9.3f}"
+        lines.append(f"  {label:<36} {numbers}  {verdict}")
     return "\n".join(lines) + "\n"

@@ -6,6 +6,7 @@ from typing import List, Optional
 
 import numpy as np
 
+from nmpc_control.analysis.gaps import stream_gaps
 from nmpc_control.analysis.record import (
     DEADLINE_MISSES,
     FOUND,
@@ -41,9 +42,10 @@ def solver_figures(record: FlightRecord, window: Optional[Window], missing: List
     figures: Metrics = dict.fromkeys(_SOLVER_FIGURES)
     status = within(record.status, window)
     if len(status):
-        counted = status[-1] - status[0]
-        figures["plans_rejected"] = int(counted[PLANS_REJECTED])
-        figures["deadline_misses"] = int(counted[DEADLINE_MISSES])
+        figures["plans_rejected"] = _counted(status[:, PLANS_REJECTED])
+        figures["deadline_misses"] = _counted(status[:, DEADLINE_MISSES])
+        if (np.diff(status[:, [PLANS_REJECTED, DEADLINE_MISSES]], axis=0) < 0.0).any():
+            missing.append("the guard restarted: its counters are summed from 0 again")
     else:
         missing.append("no status of the guard: no count of rejected plans and deadline misses")
     plans = within(record.solver, window)
@@ -66,6 +68,12 @@ def solver_figures(record: FlightRecord, window: Optional[Window], missing: List
         "max": milliseconds.max(),
     }
     return figures
+
+
+def _counted(counter: np.ndarray) -> int:
+    """Return by how much a counter (n,) rose; where it falls it started from 0 again."""
+    steps = np.diff(counter)
+    return int(np.where(steps < 0.0, counter[1:], steps).sum())
 
 
 def command_figures(record: FlightRecord, window: Optional[Window], missing: List[str]) -> Metrics:
@@ -91,7 +99,7 @@ def command_figures(record: FlightRecord, window: Optional[Window], missing: Lis
 
 
 def command_gaps(record: FlightRecord, window: Window) -> np.ndarray:
-    """Return the times [s] between successive commands while the guard streams.
+    """Return the times [s] without a command while the guard streams: none of under two commands.
 
     Without the guard's status, all commands in the window count.
     """
@@ -101,8 +109,10 @@ def command_gaps(record: FlightRecord, window: Window) -> np.ndarray:
         streaming = mode_runs(record.status, STREAMING)
         clipped = [(max(start, first), min(end, last)) for start, end in streaming]
         periods = [(start, end) for start, end in clipped if start < end]
-    gaps = [np.diff(record.commands.between(start, end).times) for start, end in periods]
-    return np.concatenate(gaps) if gaps else np.zeros(0)
+    times = record.commands.times
+    if sum(np.sum((times >= start) & (times <= end)) for start, end in periods) < 2:
+        return np.zeros(0)
+    return np.concatenate([stream_gaps(times, start, end) for start, end in periods])
 
 
 def within(series: Optional[Series], window: Optional[Window]) -> np.ndarray:

@@ -136,7 +136,9 @@ def deviation_figure(
         distance = np.linalg.norm(error.values, axis=1)
         axes.plot(error.times, distance, color=_COLOURS[name], label=f"from the reference, {name}")
     if record.position is not None:
-        flown = record.position.between(record.reference.start, window.reference_end)
+        flown = record.position.between(
+            max(record.reference.start, window.start), window.reference_end
+        )
         nearest = path_deviation(flown.values, record.reference.path.values)
         axes.plot(flown.times - window.start, nearest, color=REFERENCE, label="from its path")
     axes.set(xlabel="time [s]", ylabel="deviation [m]")
@@ -206,9 +208,10 @@ def _errors(record: FlightRecord, window: Window) -> Dict[str, Series]:
     """Return the errors (n, 3) [m] over the time since the window's start, by what was measured."""
     if record.reference is None:
         return {}
+    start = max(record.reference.start, window.start)
     positions = {"estimate": record.position, "truth": record.true_position}
     found = {
-        name: errors(position, record.reference, record.reference.start, window.reference_end)
+        name: errors(position, record.reference, start, window.reference_end)
         for name, position in positions.items()
         if position is not None
     }

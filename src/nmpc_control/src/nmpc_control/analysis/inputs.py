@@ -16,6 +16,12 @@ _NAMES = {
     "pitch_rad": PITCH_REF,
     "yaw_rate_rad_s": YAW_RATE_REF,
 }
+_PER_S = {  # names of their variation
+    "thrust_percent": "thrust_percent_s",
+    "roll_rad": "roll_rad_s",
+    "pitch_rad": "pitch_rad_s",
+    "yaw_rate_rad_s": "yaw_rate_rad_s2",
+}
 _AT_BOUND = 1e-3  # share of the range from which on an input is at its bound
 _LONGEST_HOLD = 0.5  # [s] a command counts for no longer than this
 
@@ -68,14 +74,19 @@ def input_figures(
         effort[name] = (
             np.sqrt((held[given] * (known - centre) ** 2).sum() / time) if is_known else None
         )
-        variation[name] = np.abs(np.diff(known)).sum() / time if is_known else None
+        variation[_PER_S[name]] = np.abs(np.diff(known)).sum() / time if is_known else None
     figures["input_effort"], figures["input_variation_per_s"] = effort, variation
-    figures["saturation"] = _saturation(commands.values, held, limits)
+    figures["saturation"] = _saturation(commands.values, held, limits, missing)
     return figures
 
 
-def _saturation(commands: np.ndarray, held: np.ndarray, limits: InputLimits) -> Metrics:
-    """Return the time [s] at each bound, and at any, with its share of the commanded time."""
+def _saturation(
+    commands: np.ndarray, held: np.ndarray, limits: InputLimits, missing: List[str]
+) -> Metrics:
+    """Return the time [s] at each bound, and at any, with its share of the commanded time.
+
+    Commands beyond assumed bounds show that these were not the flight's: None, and the reason.
+    """
     bounds = {
         "thrust_percent": (limits.thrust_min, limits.thrust_max),
         "roll_rad": (-limits.angle, limits.angle),
@@ -86,10 +97,20 @@ def _saturation(commands: np.ndarray, held: np.ndarray, limits: InputLimits) -> 
     figures: Metrics = {}
     for name, (low, high) in bounds.items():
         values, margin = commands[:, _NAMES[name]], _AT_BOUND * (high - low)
+        given = values[np.isfinite(values)]
+        if (given < low - margin).any() or (given > high + margin).any():
+            missing.append(
+                f"{name}: commands from {given.min():.4g} to {given.max():.4g} exceed the assumed "
+                f"bounds {low:.4g} to {high:.4g}: no time in saturation (--vehicle names others)"
+            )
+            figures[f"{name}_time_s"] = None
+            continue
         at_bound = (values <= low + margin) | (values >= high - margin)  # false where NaN
         anywhere |= at_bound
         figures[f"{name}_time_s"] = held[at_bound].sum()
     total = held.sum()
+    if None in figures.values():
+        return {**figures, "time_s": None, "share": None}
     figures["time_s"] = held[anywhere].sum()
     figures["share"] = figures["time_s"] / total if total > 0.0 else None
     return figures

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """From decoded messages to rows of numbers, or to small objects where a row does not fit."""
 
+from functools import lru_cache
 from typing import Any, Callable, Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
@@ -143,16 +144,30 @@ def _obstacles(message: Any) -> List[Obstacle]:
 
 
 def _obstacle(message: Any) -> Obstacle:
-    shape, count = _SHAPES[message.shape]
-    size = np.array(message.size[:count], dtype=float)
-    position, velocity = np.array(_xyz(message.position)), np.array(_xyz(message.velocity))
+    size = tuple(float(length) for length in message.size[:3])
+    return _shared_obstacle(
+        text(message.id), message.shape, size, _xyz(message.position), _xyz(message.velocity)
+    )
+
+
+@lru_cache(maxsize=4 * _MOST_OBSTACLES)  # what stands still comes again in every message
+def _shared_obstacle(
+    name: str,
+    kind: int,
+    lengths: Tuple[float, ...],
+    centre: Tuple[float, ...],
+    speed: Tuple[float, ...],
+) -> Obstacle:
+    shape, count = _SHAPES[kind]
+    size = np.array(lengths[:count], dtype=float)
+    position, velocity = np.array(centre), np.array(speed)
     if (
         len(size) != count
         or not np.isfinite([*size, *position, *velocity]).all()
         or (size < 0.0).any()
     ):
         raise ValueError("an obstacle that is not finite")
-    return Obstacle(text(message.id), position, size, shape, velocity)
+    return Obstacle(name, position, size, shape, velocity)
 
 
 EVENTS: Dict[str, Callable[[Any], Any]] = {

@@ -7,6 +7,7 @@ obstacle's surface. A figure that cannot be computed is None, and ``missing`` sa
 """
 
 import math
+from dataclasses import replace
 from typing import Any, Optional, Tuple
 
 import numpy as np
@@ -21,9 +22,10 @@ from nmpc_control.analysis.streams import battery_figures, stream_figures
 from nmpc_control.analysis.timeline import timeline_figures
 from nmpc_control.analysis.tracking import arrival_figures, reference_figures
 from nmpc_control.analysis.units import units
-from nmpc_control.analysis.windows import Window, scenario_window
+from nmpc_control.analysis.windows import mode_runs, scenario_window
+from nmpc_control.mode_inputs import AUTOMATIC
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 VEHICLE_RADIUS = 0.5  # [m] hull of the M100: 650 mm diagonal and 13 inch propellers
 
 
@@ -42,16 +44,16 @@ def flight_metrics(
         limits: Bounds of the inputs; None: the controller's for its own flights, else the paper's.
         segments: Also figures of parts: "mode", "goal" or seconds.
         between: First and last moment [s] since the bag's start to evaluate; None: the scenario's
-            phase.
+            phase, or what the record says.
 
     Raises:
         ValueError: ``segments`` is none of these.
         ConfigError: the controller's limits cannot be read.
     """
+    if between is not None:
+        record = replace(record, between=between)
     missing = list(record.missing)
     window = scenario_window(record)
-    if between is not None:
-        window = _narrowed(window, between)
     limits = default_limits(record) if limits is None else limits
     metrics: Metrics = {
         "schema_version": SCHEMA_VERSION,
@@ -73,6 +75,9 @@ def flight_metrics(
     metrics.update(stream_figures(record, window, missing))
     metrics.update(battery_figures(record, window, missing))
     metrics.update(timeline_figures(record, missing))
+    is_guarded = bool(mode_runs(record.status, AUTOMATIC))
+    if not is_guarded and metrics["automatic_time_s"] is not None:  # what the switch told
+        metrics["total_time_s"] = metrics["automatic_time_s"]
     if segments is not None:
         found = parts(record, segments)
         metrics["segments"] = segment_figures(record, found, vehicle_radius, limits)
@@ -81,12 +86,6 @@ def flight_metrics(
     metrics["missing"] = list(dict.fromkeys(missing))
     metrics["units"] = units(metrics)
     return plain(metrics)
-
-
-def _narrowed(window: Optional[Window], between: Tuple[float, float]) -> Window:
-    start, end = between
-    reference_end = end if window is None else min(end, window.reference_end)
-    return Window(start, max(start, reference_end), end)
 
 
 def plain(value: Any) -> Any:

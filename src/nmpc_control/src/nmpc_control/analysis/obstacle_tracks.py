@@ -36,13 +36,14 @@ def _time(message: Event) -> float:
 
 
 def _track(observations: List[Tuple[float, Obstacle]], times: List[float]) -> ObstacleTrack:
-    first, _ = observations[0]
+    first, earliest = observations[0]
     last, obstacle = observations[-1]
     begin = -np.inf if first <= times[0] else first
     end = next((t for t in times if t > last), np.inf)
     centres = np.array([o.position for _, o in observations])
     if np.ptp(centres, axis=0).max() > 0.0:
-        return ObstacleTrack(obstacle, Series([t for t, _ in observations], centres), begin, end)
+        seen = Series([t for t, _ in observations], centres)
+        return ObstacleTrack(obstacle, seen, begin, end, earliest.velocity)
     moving = Obstacle(
         obstacle.id, obstacle.position, obstacle.size, obstacle.shape, obstacle.velocity, last
     )

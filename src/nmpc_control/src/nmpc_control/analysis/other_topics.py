@@ -66,3 +66,11 @@ def published_reference(points: Series, automatic: Optional[Tuple[float, float]]
     inside = inside if len(inside) else points
     start = float(inside.times[0])
     return Reference(start, Series(inside.times - start, inside.values))
+
+
+def battery_percent(battery: Optional[Series], remarks: List[str]) -> Optional[Series]:
+    """Return the state of charge in percent, which other drivers than DJI's give from 0 to 1."""
+    if battery is None or not np.isfinite(battery.values).any() or (battery.values > 1.0).any():
+        return battery
+    remarks.append("battery_state is taken as a share of 1")
+    return Series(battery.times, 100.0 * battery.values)

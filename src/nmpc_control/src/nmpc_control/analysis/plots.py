@@ -97,7 +97,12 @@ def error_rows(record: FlightRecord, window: Window) -> Rows:
         return {}
     found = {
         name: (
-            errors(position, record.reference, record.reference.start, window.reference_end),
+            errors(
+                position,
+                record.reference,
+                max(record.reference.start, window.start),
+                window.reference_end,
+            ),
             colour,
         )
         for name, position, colour in (
@@ -120,7 +125,9 @@ def error_rows(record: FlightRecord, window: Window) -> Rows:
         for name, (error, colour) in found.items()
     ]
     if record.position is not None:
-        flown = record.position.between(record.reference.start, window.reference_end)
+        flown = record.position.between(
+            max(record.reference.start, window.start), window.reference_end
+        )
         nearest = path_deviation(flown.values, record.reference.path.values)
         rows["deviation [m]"].append(
             Curve("from the path", Series(flown.times, nearest), REFERENCE, dash="dot")

@@ -82,11 +82,26 @@ class ObstacleTrack:
     centres: Optional[Series] = None  # observed positions (k, 3) [m]; None: the obstacle's own
     begin: float = -np.inf  # [s] it is not there before
     end: float = np.inf  # [s] nor after
+    first_velocity: Optional[np.ndarray] = None  # (3,) [m/s] when first observed; None: as later
+
+    @property
+    def observed(self) -> Optional[np.ndarray]:
+        """Times [s] at which a moving obstacle was observed; None of one that stands still."""
+        if self.centres is not None:
+            return self.centres.times
+        return None if self.obstacle.stamp is None else np.array([self.obstacle.stamp])
 
     def centre_at(self, times: np.ndarray) -> np.ndarray:
-        """Return the centres (m, 3) [m] at times (m,) [s]."""
+        """Return the centres (m, 3) [m] at times (m,) [s].
+
+        Before the first and after the last observation an obstacle moves at the velocity it had.
+        """
         if self.centres is not None:
-            return self.centres.at(times)
+            times, velocity = np.asarray(times, dtype=float), self.obstacle.velocity
+            first = velocity if self.first_velocity is None else self.first_velocity
+            early = np.minimum(times - self.centres.times[0], 0.0)[:, None]
+            late = np.maximum(times - self.centres.times[-1], 0.0)[:, None]
+            return self.centres.at(times) + early * first + late * velocity
         if self.obstacle.stamp is None:
             return np.tile(np.asarray(self.obstacle.position, dtype=float), (len(times), 1))
         age = np.asarray(times)[:, None] - self.obstacle.stamp
@@ -125,5 +140,6 @@ class FlightRecord:
     airborne: Optional[Tuple[float, float]] = None  # [s] first and last moment in the air
     automatic: Optional[Tuple[float, float]] = None  # [s] from take-off to landing, of this flight
     phase_end: Optional[float] = None  # [s] the trajectory's phase ended; None: with the data
+    between: Optional[Tuple[float, float]] = None  # [s] evaluate this; None: the scenario's phase
     reported_collisions: Optional[int] = None  # counted by the simulator
     missing: Tuple[str, ...] = ()  # plain sentences: what could not be read, and why

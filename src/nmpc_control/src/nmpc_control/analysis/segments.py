@@ -46,6 +46,9 @@ def parts(record: FlightRecord, by: str) -> List[Part]:
         found = [Part(name or "goal", start, end, None) for name, start, end in record.goals]
     else:
         found = _by_time(record, length_of(by))
+    if record.between is not None:
+        first, last = record.between
+        found = [p._replace(start=max(p.start, first), end=min(p.end, last)) for p in found]
     return [part for part in found if part.end - part.start >= _SHORTEST][:_MOST]
 
 

@@ -5,6 +5,7 @@ from typing import List, Optional
 
 import numpy as np
 
+from nmpc_control.analysis.gaps import stream_gaps
 from nmpc_control.analysis.record import FlightRecord, Metrics
 from nmpc_control.analysis.windows import Window, runs
 from nmpc_control.state import THRUST
@@ -21,17 +22,17 @@ def stream_figures(record: FlightRecord, window: Optional[Window], missing: List
         return {"streams": None}
     streams = {}
     for name, times in record.stamps.items():
-        inside = np.sort(times[(times >= window.start) & (times <= window.end)])
-        if len(inside) < 2:
+        count = int(np.sum((times >= window.start) & (times <= window.end)))
+        if count < 2:
             if len(times) > 2:
                 missing.append(f"{name}: no two messages in the evaluated time: no rate")
             continue
-        gaps = np.diff(inside)
+        gaps = stream_gaps(times, window.start, window.end)
         streams[name] = {
             "rate_hz": len(gaps) / max(gaps.sum(), 1e-9),
             "gap_ms_p99": 1e3 * np.percentile(gaps, 99),
             "gap_ms_max": 1e3 * gaps.max(),
-            "messages": len(inside),
+            "messages": count,
         }
     return {"streams": streams}
 

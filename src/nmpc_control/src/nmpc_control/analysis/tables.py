@@ -160,9 +160,14 @@ def _cells(cells: Sequence[str], widths: Sequence[int]) -> str:
 
 def title(flight: Metrics) -> str:
     """Return what a column is called."""
-    number = f" ({flight['flight']}/{flight['flights']})" if flight["flights"] > 1 else ""
     scenario = f" {flight['scenario']}" if flight["scenario"] else ""
-    return f"{flight['bag'] or 'flight'}{number}{scenario}"
+    return name_of(flight) + scenario
+
+
+def name_of(flight: Metrics) -> str:
+    """Return the bag's name, with the flight's number where the bag has several."""
+    number = f" ({flight['flight']}/{flight['flights']})" if flight["flights"] > 1 else ""
+    return f"{flight['bag'] or 'flight'}{number}"
 
 
 def _rows(cells: Dict[str, Cell], flights: Sequence[Metrics]) -> List[Row]:

@@ -34,7 +34,20 @@ class Period(NamedTuple):
 
 
 def periods(record: FlightRecord) -> List[Period]:
-    """Return the parts of a bag by mode; from the transmitter's switch where no guard told."""
+    """Return the parts of a flight by mode; from the transmitter's switch where no guard told.
+
+    Of the only flight of a bag they are those of the whole bag, on the ground too.
+    """
+    found = _of_bag(record)
+    spans = [span for span in (record.automatic, record.airborne) if span is not None]
+    if record.flight[1] <= 1 or not spans:
+        return found
+    first, last = min(span[0] for span in spans), max(span[1] for span in spans)
+    inside = [p._replace(start=max(p.start, first), end=min(p.end, last)) for p in found]
+    return [p for p in inside if p.start < p.end]
+
+
+def _of_bag(record: FlightRecord) -> List[Period]:
     if record.status is not None and len(record.status):
         return _of_status(record.status)
     if record.rc is not None and len(record.rc):
@@ -52,7 +65,7 @@ def shown_window(record: FlightRecord) -> Optional[Window]:
     window = scenario_window(record)
     flown = [p for p in periods(record) if p.automatic is not None]
     by_hand = [p for p in flown if not p.automatic]
-    if window is None or not by_hand:
+    if window is None or record.between is not None or not by_hand:
         return window
     start, end = min(window.start, by_hand[0].start), max(window.end, flown[-1].end)
     if record.airborne is not None:

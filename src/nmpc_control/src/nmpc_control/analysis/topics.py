@@ -93,6 +93,8 @@ def select(connections: Sequence[Any], namespace: Optional[str] = None) -> Selec
         found.update(common)
     if "odometry" in found:
         found.pop("tf", None)  # says nothing more, and there is much of it
+    if any(connection.msgcount for connection in found.get("obstacles", ())):
+        found.pop("sensed_obstacles", None)  # the controller's own list is the one that counts
     is_simulation = any("uav_sim" in connection.topic.split("/") for connection in connections)
     return Selection(chosen, found, is_simulation, tuple(remarks))
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from nmpc_control.analysis.deviation import arrival_time, errors, path_deviation
 from nmpc_control.analysis.following import following_figures
+from nmpc_control.analysis.gaps import LONGEST_GAP, distance_to_sample, uncovered
 from nmpc_control.analysis.record import FlightRecord, Metrics, Reference, Series
 from nmpc_control.analysis.windows import Window
 
@@ -48,12 +49,24 @@ def reference_figures(
             missing.append(
                 "no position estimate while the reference ran: no deviation of the estimate"
             )
+        _say_uncovered(record.position, "position estimates", window, missing)
     if record.true_position is None:
         missing.append("no ground truth: no deviation of the true position")
     else:
         error = errors(record.true_position, reference, window.start, window.reference_end)
         figures.update(_deviation_figures(error, "_truth"))
+        _say_uncovered(record.true_position, "true positions", window, missing)
     return figures
+
+
+def _say_uncovered(position: Series, name: str, window: Window, missing: List[str]) -> None:
+    lost = uncovered(position.times, window.start, window.reference_end)
+    if lost > 0.0:
+        whole = window.reference_end - window.start
+        missing.append(
+            f"{name} are missing for {lost:.1f} s of {whole:.1f} s while the reference ran: "
+            "deviations tell nothing of that time"
+        )
 
 
 def _deviation_figures(error: Optional[Series], suffix: str) -> Metrics:
@@ -87,6 +100,8 @@ def _retimed_figures(record: FlightRecord, window: Optional[Window], missing: Li
             "what the controller compared with is not known: no deviation from a re-timed reference"
         )
         return _deviation_figures(None, "_retimed")
+    if record.reference is None:  # what is published then is where to hold, not what to follow
+        return _deviation_figures(None, "_retimed")
     start, end = max(window.start, position.times[0]), min(window.reference_end, position.times[-1])
     tracked = tracked.between(start, end)
     error = Series(tracked.times, position.at(tracked.times) - tracked.values)
@@ -107,9 +122,17 @@ def arrival_figures(record: FlightRecord, window: Optional[Window], missing: Lis
         return figures
     arrival = arrival_time(record.position, record.velocity, record.reference, window.end)
     goal = record.reference.path.values[-1]
-    figures["arrived"] = arrival is not None
+    is_seen = distance_to_sample(record.position.times, window.end) <= LONGEST_GAP
+    figures["arrived"] = True if arrival is not None else False if is_seen else None
     figures["navigation_time_s"] = None if arrival is None else arrival - window.start
-    figures["end_distance_m"] = np.linalg.norm(record.position.at(np.array([window.end]))[0] - goal)
-    if arrival is None:
+    if is_seen:
+        last = record.position.at(np.array([window.end]))[0]
+        figures["end_distance_m"] = np.linalg.norm(last - goal)
+    else:
+        missing.append(
+            f"no position estimate within {LONGEST_GAP} s of the end: no end distance"
+            + ("" if arrival is not None else ", and whether the aircraft arrived is not known")
+        )
+    if arrival is None and is_seen:
         missing.append("the aircraft did not arrive: no navigation time")
     return figures

@@ -28,8 +28,10 @@ def write_tum(record: FlightRecord, directory: Path) -> List[str]:
     written: List[str] = []
     if record.position is None or window is None:
         return written
-    directory.mkdir(parents=True, exist_ok=True)
     estimate = record.position.between(window.start, window.end)
+    if not len(estimate):
+        return written
+    directory.mkdir(parents=True, exist_ok=True)
     if record.reference is not None:
         error = errors(record.position, record.reference, window.start, window.reference_end)
         estimate = Series(error.times, error.values + record.reference.position_at(error.times))

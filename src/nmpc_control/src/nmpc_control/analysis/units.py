@@ -7,7 +7,9 @@ from nmpc_control.analysis.record import Metrics
 
 _UNITS = (  # longest first: the first end that fits counts
     ("_rad_s_time_s", "s"),
-    ("_variation_per_s", "1/s"),
+    ("_variation_per_s", None),  # of each input its own
+    ("_percent_s", "percent/s"),
+    ("_rad_s2", "rad/s^2"),
     ("_m_s3", "m/s^3"),
     ("_rad_s", "rad/s"),
     ("_m_s", "m/s"),

@@ -40,6 +40,15 @@ def run_at(periods: List[Tuple[float, float]], t: float) -> Optional[Tuple[float
 
 def scenario_window(record: FlightRecord) -> Optional[Window]:
     """Return the period to evaluate, or None where nothing says when the flight was."""
+    window = _phase(record)
+    if record.between is None:
+        return window
+    start, end = record.between
+    reference_end = end if window is None else min(end, window.reference_end)
+    return Window(start, max(start, reference_end), end)
+
+
+def _phase(record: FlightRecord) -> Optional[Window]:
     if record.reference is None:
         period = record.automatic or record.airborne or _extent(record)
         return period and Window(period[0], period[1], period[1])

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from nmpc_control.analysis.identification.document import as_document
 from nmpc_control.analysis.identification.identify import ALWAYS, Identification, identify
-from nmpc_control.analysis.identification.log import read_log
+from nmpc_control.analysis.identification.log import Log, read_log
 from nmpc_control.analysis.identification.segments import FLIGHT, LIMITED
 from nmpc_control.analysis.identification.summary import as_text
 from nmpc_control.analysis.identification.vehicle_file import vehicle_yaml
@@ -105,6 +105,10 @@ def _check(arguments: argparse.Namespace) -> None:
             _give_up(f"--{name}: got {period[0]:g} {period[1]:g}, expected the earlier time first")
         if period is not None and len(arguments.bags) > 1:
             _give_up(f"--{name}: times are of one bag, got {len(arguments.bags)} bags")
+    if arguments.validate is not None and arguments.fit is None:
+        _give_up(
+            "--validate: expected --fit too: all of the bag would be fitted, this part as well"
+        )
     if len({path.resolve() for path in arguments.bags}) < len(arguments.bags):
         _give_up("the same bag twice would count its data twice")
     if arguments.write is not None and arguments.regime != "normal":
@@ -119,11 +123,23 @@ def _identify(arguments: argparse.Namespace) -> Identification:
             logs.append(read_log(path, arguments.namespace, progress_of(path), name))
         except BagError as error:
             raise BagError(f"{path}: {error}") from None
+    for option in ("fit", "validate"):
+        _check_period(option, getattr(arguments, option), arguments.bags[0], logs[0])
     fit = tuple(arguments.fit) if arguments.fit else ALWAYS
     held_back = tuple(arguments.validate) if arguments.validate else None
     is_shown = sys.stderr.isatty()
     with Console(stderr=True).status("identifying") if is_shown else nullcontext():
         return identify(logs, fit, held_back, _REGIMES[arguments.regime])
+
+
+def _check_period(option: str, period: Optional[Sequence[float]], path: Path, log: Log) -> None:
+    first = max(log.commands.times[0], log.attitude.times[0])
+    last = min(log.commands.times[-1], log.attitude.times[-1])
+    if period is not None and min(period[1], last) <= max(period[0], first):
+        raise BagError(
+            f"{path}: --{option}: got {period[0]:g} to {period[1]:g} s, expected a part of "
+            f"{first:.1f} to {last:.1f} s, where commands and attitude are"
+        )
 
 
 def _name(path: Path, paths: Sequence[Path]) -> str:

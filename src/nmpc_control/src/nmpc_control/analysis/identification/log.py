@@ -9,6 +9,7 @@ import numpy as np
 
 from nmpc_control.analysis import recording as reading
 from nmpc_control.analysis.messages import IMU_QUATERNION, SETPOINTS, text
+from nmpc_control.analysis.other_topics import battery_percent
 from nmpc_control.analysis.quaternions import rpy_of
 from nmpc_control.analysis.record import Series
 from nmpc_control.analysis.recording import Progress, Recording
@@ -85,7 +86,7 @@ def read_log(
         attitude=attitude,
         velocity=rows.get("velocity"),
         imu=rows.get("imu"),
-        battery=_percent(rows.get("battery"), remarks),
+        battery=battery_percent(rows.get("battery"), remarks),
         rc=rows.get("rc"),
         flight_status=rows.get("flight_status"),
         status=rows.get("status"),
@@ -117,14 +118,6 @@ def _commands(rows: Dict[str, Series]) -> Series:
         )
     times = np.concatenate([series.times for series in found])
     return Series(times, np.concatenate([series.values for series in found]))
-
-
-def _percent(battery: Optional[Series], remarks: list) -> Optional[Series]:
-    """Return the state of charge in percent, which other drivers than DJI's give from 0 to 1."""
-    if battery is None or battery.values.max() > 1.0:
-        return battery
-    remarks.append("battery_state is taken as a share of 1")
-    return Series(battery.times, 100.0 * battery.values)
 
 
 def _attitude(rows: Dict[str, Series]) -> Series:
