@@ -86,8 +86,7 @@ class SqpSolver:
         accuracy, before = _FIRST_ACCURACY, np.inf
         iterations, status, step = 0, "budget", Step(np.inf, -np.inf, np.inf, 0, False)
         while np.isfinite(cost):
-            late = time.perf_counter() - start > self.time_budget
-            if iterations >= self.max_iterations or late:
+            if iterations >= self.max_iterations or time.perf_counter() - start > self.time_budget:
                 break
             step = self._direction(model)
             scale = 1.0 + self._tracking

@@ -72,6 +72,8 @@ def select(connections: Sequence[Any], namespace: Optional[str] = None) -> Selec
         if role in _COMMON:
             if connection.msgtype == ROLES[role].msgtype:
                 common.setdefault(role, []).append(connection)
+        elif prefix.endswith("/uav_sim"):
+            continue  # the simulator's own truth, not another vehicle's
         elif role is not None and connection.msgtype == ROLES[role].msgtype:
             vehicles.setdefault(prefix, {}).setdefault(role, []).append(connection)
         elif connection.msgtype == MAV_COMMAND:
