@@ -112,11 +112,13 @@ def _percent(flags: Sequence[bool]) -> float:
     return 100.0 * float(np.mean(flags)) if len(flags) else 100.0
 
 
-def draw(seed: int, count: int, until: Optional[float] = None) -> List[Problem]:
+def draw(
+    seed: int, count: int, until: Optional[float] = None, bounded: float = 0.0
+) -> List[Problem]:
     """Return ``count`` problems, half of them recorded until that part of the flights."""
     recorded = recorded_problems(-(-count // (2 * len(KINDS))), seed, until)
     problems = [problem for kind in KINDS for problem in recorded[kind]][: count // 2]
-    return problems + random_problems(seed, count - len(problems))
+    return problems + random_problems(seed, count - len(problems), bounded)
 
 
 def study(problems: List[Problem], quiet: bool = False) -> List[Comparison]:
@@ -137,9 +139,16 @@ def main(argv: Optional[List[str]] = None) -> None:
     parser.add_argument(
         "--count", type=int, default=500, help="number of problems (default: %(default)s)"
     )
+    parser.add_argument(
+        "--bounded",
+        type=float,
+        default=0.0,
+        help="part of the random problems with felt bounds of speed, input rate, Eq. 7 "
+        "(default: %(default)s)",
+    )
     parser.add_argument("--json", type=Path, help="write every comparison to this file")
     options = parser.parse_args(argv)
-    comparisons = study(draw(options.seed, options.count))
+    comparisons = study(draw(options.seed, options.count, bounded=options.bounded))
     if options.json:
         data = {"summary": summary(comparisons), "problems": [asdict(c) for c in comparisons]}
         options.json.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")

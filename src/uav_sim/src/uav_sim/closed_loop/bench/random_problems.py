@@ -28,15 +28,20 @@ _MOST_SPHERES = 4
 _RADIUS = (0.2, 0.8)  # [m]
 _ASIDE = (1.5, 1.5, 1.0)  # [m] sigma of their distance from the path
 _PASSAGE = 1.2  # [m] least gap between two surfaces
-_BOUNDED = 0.2  # part of the problems with bounds that are felt
 _SPEED, _RATE = (1.2, 3.0), (0.2, 1.0)  # [m/s] limit; part of the usual input rate
 _PERIOD = 0.05  # [s] since the solve that a warm start comes from
 
 
-def random_problems(seed: int, count: int) -> List[Problem]:
+def random_problems(seed: int, count: int, bounded: float = 0.0) -> List[Problem]:
     """Return problems drawn with a seed; every second one is warm started, the others from hover.
 
     A warm start is the shifted solution of the problem before the disturbance.
+
+    Args:
+        seed: of the draw.
+        count: number of problems.
+        bounded: part of them with bounds of speed and input rate that are felt, half of these with
+            Eq. 7 as an inequality.
     """
     rng = np.random.default_rng(seed)
     scenarios = [load_scenario(name) for name in _SCENARIOS]
@@ -46,7 +51,8 @@ def random_problems(seed: int, count: int) -> List[Problem]:
     usual, result = nmpc.parameters, []
     for i in range(count):
         parameters = replace(usual, weights=weights[rng.integers(len(weights))])
-        nmpc.use(_bounded(rng, parameters) if rng.random() < _BOUNDED else parameters)
+        is_bounded = bounded > 0.0 and rng.random() < bounded
+        nmpc.use(_bounded(rng, parameters) if is_bounded else parameters)
         result.append(_draw(rng, scenarios[rng.integers(len(scenarios))], nmpc, warm=i % 2 == 1))
     return result
 
