@@ -151,19 +151,17 @@ class SqpSolver:
             if cost <= _BAD_GUESS * (1.0 + guess.cost):
                 self._accept()
                 return cost, StepModel(newton=guess.gains is not None)
-            trials.append(self._trial())
+            trials.append(self._trial(cost))
         hover = cold_guess(instance.x0, self.structure.horizon)
         self._load(hover.states, hover.inputs)
-        self._evaluate(0.0)
-        trials.append(self._trial())
+        trials.append(self._trial(self._evaluate(0.0)))
         # toward the reference, under the feedback law of the problem linearised there
         states = instance.stages[:NX].T.copy()
         states[:, YAW] = np.unwrap(np.r_[instance.x0[YAW], states[:, YAW]])[1:]
         self._load(states, instance.stages[NX : NX + NU, :-1].T)
         self._direction(StepModel(newton=False))
         for alpha in (0.0, 1.0):
-            self._evaluate(alpha)
-            trials.append(self._trial())
+            trials.append(self._trial(self._evaluate(alpha)))
         trials = [trial for trial in trials if np.isfinite(trial[0])]
         if not trials:
             return np.inf, StepModel(False)
@@ -194,9 +192,8 @@ class SqpSolver:
         self._forward()
         return float(self._arrays["cost"].sum())
 
-    def _trial(self) -> Tuple[float, np.ndarray, np.ndarray]:
-        a = self._arrays
-        return float(a["cost"].sum()), a["X_new"].T.copy(), a["U_new"].T.copy()
+    def _trial(self, cost: float) -> Tuple[float, np.ndarray, np.ndarray]:
+        return cost, self._arrays["X_new"].T.copy(), self._arrays["U_new"].T.copy()
 
     def _direction(self, model: StepModel) -> Step:
         """Compute step and gains, by the exact Hessian if that is wanted and positive."""

@@ -96,23 +96,20 @@ class LocalFrame:
 
     def to_world(self, place: GeoPoint) -> Vector:
         """Return the world position (3,) [m] of a place; inverts ``to_earth``."""
-        home = self.home
-        circle = EARTH_RADIUS * math.cos(math.radians(place.latitude))
-        return (
-            math.radians(place.longitude - home.longitude) * circle,
-            math.radians(place.latitude - home.latitude) * EARTH_RADIUS,
-            place.altitude - home.altitude,
-        )
+        return _from_origin(place, self.home)
 
     def to_local(self, place: GeoPoint) -> Vector:
         """Return east, north, up [m] of a place from the reference, as dji_sdk computes them."""
-        reference = self.reference
-        circle = EARTH_RADIUS * math.cos(math.radians(place.latitude))
-        return (
-            math.radians(place.longitude - reference.longitude) * circle,
-            math.radians(place.latitude - reference.latitude) * EARTH_RADIUS,
-            place.altitude - reference.altitude,
-        )
+        return _from_origin(place, self.reference)
+
+
+def _from_origin(place: GeoPoint, origin: GeoPoint) -> Vector:
+    circle = EARTH_RADIUS * math.cos(math.radians(place.latitude))
+    return (
+        math.radians(place.longitude - origin.longitude) * circle,
+        math.radians(place.latitude - origin.latitude) * EARTH_RADIUS,
+        place.altitude - origin.altitude,
+    )
 
 
 class Telemetry:

@@ -74,7 +74,7 @@ def _add_choices(found: argparse.ArgumentParser) -> None:
     found.add_argument(
         "--between",
         nargs=2,
-        type=_seconds,
+        type=seconds,
         metavar=("START", "END"),
         help="evaluate these seconds since the bag's start (default: the scenario's phase)",
     )
@@ -112,7 +112,8 @@ def _segments(text: str) -> str:
     return text
 
 
-def _seconds(text: str) -> float:
+def seconds(text: str) -> float:
+    """Return a finite number of seconds; for argparse."""
     value = _number(text)
     if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f"got {text}, expected seconds")

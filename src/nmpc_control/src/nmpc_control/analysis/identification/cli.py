@@ -18,6 +18,7 @@ from nmpc_control.analysis.identification.log import Log, read_log
 from nmpc_control.analysis.identification.segments import FLIGHT, LIMITED
 from nmpc_control.analysis.identification.summary import as_text
 from nmpc_control.analysis.identification.vehicle_file import vehicle_yaml
+from nmpc_control.analysis.options import seconds
 from nmpc_control.analysis.progress import progress_of
 from nmpc_control.errors import BagError, NmpcError
 from nmpc_control.params import load_vehicle
@@ -62,7 +63,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write everything as JSON")
     parser.add_argument("--write", type=Path, metavar="YAML", help="write a vehicle file")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="write residual plots")
-    period = {"nargs": 2, "type": _seconds, "metavar": ("FROM", "TO")}
+    period = {"nargs": 2, "type": seconds, "metavar": ("FROM", "TO")}
     parser.add_argument("--fit", **period, help="identify from this part of one bag [s]")
     parser.add_argument("--validate", **period, help="state the fit on this part of it too [s]")
     parser.add_argument(
@@ -89,13 +90,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--quiet", action="store_true", help="print nothing")
     return parser
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"got {text}, expected seconds")
-    return value
 
 
 def _check(arguments: argparse.Namespace) -> None:
