@@ -13,6 +13,7 @@ pytest.importorskip("nmpc_msgs", reason="the workspace is not built or not sourc
 import rospy
 from std_msgs.msg import Header
 
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.ros.conversions import (
     MessageError,
     obstacles_from_msg,
@@ -23,7 +24,7 @@ from nmpc_control.ros.conversions import (
     prediction_to_msg,
 )
 from nmpc_control.rotations import rpy_from_quaternion
-from nmpc_control.state import Goal, Obstacle, Plan
+from nmpc_control.state import Goal, Plan
 
 STAMP = rospy.Time(12, 500_000_000)
 HEADER = Header(stamp=STAMP, frame_id="world")

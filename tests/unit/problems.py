@@ -9,8 +9,8 @@ from typing import List, Sequence
 import numpy as np
 
 from nmpc_control.nmpc import Nmpc
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters, load_parameters
-from nmpc_control.state import Obstacle
 
 SPHERE = Obstacle("sphere", np.array([4.0, 0.3, 5.2]), np.array([0.6]))
 

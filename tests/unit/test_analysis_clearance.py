@@ -9,7 +9,7 @@ from nmpc_control.analysis.obstacle_tracks import obstacle_tracks
 from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Series
 from nmpc_control.analysis.recording import Event
 from nmpc_control.analysis.windows import Window
-from nmpc_control.state import Obstacle
+from nmpc_control.obstacle import Obstacle
 
 HULL = 0.5
 SPHERE = Obstacle("ball", np.array([5.0, 2.0, 3.0]), np.array([0.6]))

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from nmpc_control.analysis.compare import as_text, compare
 from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Reference, Series
-from nmpc_control.state import Obstacle
+from nmpc_control.obstacle import Obstacle
 
 TIMES = np.arange(0.0, 100.0, 0.05)
 PATH = Reference(0.0, Series([0.0, 100.0], [[0.0, 0.0, 2.0], [100.0, 0.0, 2.0]]))

@@ -10,7 +10,7 @@ import pytest
 from nmpc_control.analysis.metrics import flight_metrics
 from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Reference, Series
 from nmpc_control.mode_inputs import Mode
-from nmpc_control.state import Obstacle
+from nmpc_control.obstacle import Obstacle
 
 START, DURATION = 50.0, 20.0
 TIMES = np.arange(4000, 9000) / 100.0

@@ -9,10 +9,11 @@ from problems import SPHERE, parameters, straight_reference
 from nmpc_control.controller import Controller
 from nmpc_control.errors import ConfigError, ProblemError
 from nmpc_control.nmpc import Nmpc
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.packing import pack_theta
 from nmpc_control.params import Lag, load_parameters
 from nmpc_control.scenario import load_scenario
-from nmpc_control.state import Goal, Obstacle, Plan, hover_input, hover_state
+from nmpc_control.state import Goal, Plan, hover_input, hover_state
 from nmpc_control.trajectory import line
 
 START = hover_state(np.array([0.0, 0.0, 5.0]))

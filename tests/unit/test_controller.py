@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from nmpc_control.controller import Controller
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import load_parameters
 from nmpc_control.prediction import predict
-from nmpc_control.state import GRAVITY, POSITION, Goal, Obstacle
+from nmpc_control.state import GRAVITY, POSITION, Goal
 from nmpc_control.trajectory import line
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)

@@ -13,8 +13,9 @@ from nmpc_control.dji import FlightStatus, RcMode
 from nmpc_control.guard_data import Action
 from nmpc_control.ladder import Rung
 from nmpc_control.mode_inputs import Mode, Request
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import load_vehicle
-from nmpc_control.state import Goal, Obstacle, hover_input
+from nmpc_control.state import Goal, hover_input
 
 INDOORS = {"gps_health": 0, "needs_gps": False}
 EXTERNAL = dataclasses.replace(PARAMS, position_source="external")

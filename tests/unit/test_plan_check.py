@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 
 from nmpc_control import prediction
 from nmpc_control.model import model_parameters, step_function
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import load_vehicle
 from nmpc_control.plan_check import Finding, check_flown, check_plan
 from nmpc_control.plan_consistency import euler_step, rk4_step
-from nmpc_control.state import GRAVITY, Obstacle, hover_input, hover_state
+from nmpc_control.state import GRAVITY, hover_input, hover_state
 
 START = hover_state(np.array([1.0, 2.0, 3.0]))
 CHECK = PARAMS.plan_check

@@ -14,11 +14,12 @@ from nmpc_control import prediction
 from nmpc_control.compiled_function import compile_functions
 from nmpc_control.errors import ProblemError
 from nmpc_control.nmpc import Nmpc
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.ocp import Structure
 from nmpc_control.packing import pack_stages
 from nmpc_control.params import load_parameters
 from nmpc_control.sqp import sweeps
-from nmpc_control.state import GRAVITY, Obstacle, hover_input, hover_state
+from nmpc_control.state import GRAVITY, hover_input, hover_state
 
 
 @pytest.fixture(scope="module")

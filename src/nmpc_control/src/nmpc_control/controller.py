@@ -14,10 +14,12 @@ from nmpc_control.errors import ProblemError
 from nmpc_control.estimator import Estimator, StateEstimate
 from nmpc_control.itinerary import Itinerary
 from nmpc_control.nmpc import Nmpc
+from nmpc_control.obstacle import Obstacle
+from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.params import Parameters
 from nmpc_control.prediction import predict
 from nmpc_control.solution import no_solution
-from nmpc_control.state import POSITION, VELOCITY, YAW, Goal, Obstacle, Plan, hover_input
+from nmpc_control.state import POSITION, VELOCITY, YAW, Goal, Plan, hover_input
 
 _INPUT_MEMORY = 2.0  # [s] inputs older than this cannot matter for the delay
 
@@ -118,11 +120,5 @@ class Controller:
 
     def _clearance(self, positions: np.ndarray, times: np.ndarray) -> float:
         """Return the least distance [m] from hull to surface for positions (M, 3) at times (M,)."""
-        radius = self.parameters.vehicle.radius
-        distances = [
-            np.min([obstacle.distance(p, s) for p, s in zip(positions, times)]) - radius
-            if obstacle.stamp is not None
-            else np.min(obstacle.distance(positions)) - radius
-            for obstacle in self.obstacles
-        ]
-        return float(min(distances, default=np.inf))
+        distances = ObstacleField(self.obstacles).distances(positions, times)
+        return float(distances.min(initial=np.inf)) - self.parameters.vehicle.radius

@@ -10,7 +10,8 @@ from nmpc_control.dji import Axes
 from nmpc_control.estimator import StateEstimate
 from nmpc_control.ladder import Rung
 from nmpc_control.mode_inputs import Mode, ModeInputs
-from nmpc_control.state import Goal, Obstacle, Plan
+from nmpc_control.obstacle import Obstacle
+from nmpc_control.state import Goal, Plan
 
 
 class Action(Enum):

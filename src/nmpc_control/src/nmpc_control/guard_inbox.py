@@ -9,7 +9,8 @@ from nmpc_control.estimator import Estimator
 from nmpc_control.guard_data import GuardInputs
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.mode_inputs import ModeInputs, Request
-from nmpc_control.state import Goal, Obstacle, Plan
+from nmpc_control.obstacle import Obstacle
+from nmpc_control.state import Goal, Plan
 
 
 class GuardInbox:

@@ -7,6 +7,7 @@ from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.plan_check import (
     Finding,
@@ -15,7 +16,7 @@ from nmpc_control.plan_check import (
     check_flown,
     check_plan,
 )
-from nmpc_control.state import Goal, Obstacle, Plan
+from nmpc_control.state import Goal, Plan
 
 
 class Rung(IntEnum):

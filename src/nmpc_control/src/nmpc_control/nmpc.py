@@ -7,13 +7,14 @@ from typing import Optional, Sequence, Union
 import numpy as np
 
 from nmpc_control.ipopt import IpoptSolver
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.ocp import Instance, Structure
 from nmpc_control.packing import check_arguments, pack_stages, pack_theta
 from nmpc_control.params import Parameters
 from nmpc_control.slots import Slots, clearance
 from nmpc_control.solution import Guess, Solution, shift
 from nmpc_control.sqp import SqpSolver
-from nmpc_control.state import GRAVITY, Obstacle, Plan, hover_input
+from nmpc_control.state import GRAVITY, Plan, hover_input
 
 
 class Nmpc:

@@ -8,7 +8,7 @@ import numpy as np
 
 from nmpc_control.config import from_dict
 from nmpc_control.errors import ConfigError
-from nmpc_control.state import Obstacle
+from nmpc_control.obstacle import Obstacle
 
 _REACH = 1e4  # [m]
 

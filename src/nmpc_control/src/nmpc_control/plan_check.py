@@ -8,22 +8,12 @@ from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.plan_consistency import as_flown, departure
 from nmpc_control.prediction import predict
 from nmpc_control.rotations import wrap_angle
-from nmpc_control.state import (
-    NU,
-    NX,
-    PITCH,
-    POSITION,
-    ROLL,
-    VELOCITY,
-    YAW,
-    YAW_RATE,
-    Obstacle,
-    Plan,
-)
+from nmpc_control.state import NU, NX, PITCH, POSITION, ROLL, VELOCITY, YAW, YAW_RATE, Plan
 
 SPACING = 0.05  # [m] of the points between two stages at which clearance is looked at
 MAX_POINTS = 40  # [1] between two stages
@@ -177,14 +167,14 @@ def _clearance_along(
 ) -> Tuple[np.ndarray, np.ndarray]:
     stages = plan.t + plan.delay + plan.dt * np.arange(len(plan.states))
     centres = plan.states[:, POSITION]
-    relative = centres - obstacle.position_at(stages[:, None])
+    relative = centres - obstacle.position_at(stages)
     longest = float(np.linalg.norm(np.diff(relative, axis=0), axis=1).max())
     count = math.ceil(min(max(1.0, longest / SPACING), MAX_POINTS))  # NaN gives 1
     start = min(max(t, stages[0]), stages[-1])
     times = np.linspace(stages[0], stages[-1], count * plan.horizon + 1)
     times = np.concatenate([[start], times[times > start]])
     points = np.stack([np.interp(times, stages, centres[:, i]) for i in range(3)], axis=1)
-    return times, obstacle.distance(points, times[:, None]) - radius
+    return times, obstacle.distance(points, times) - radius
 
 
 def _check_envelope(

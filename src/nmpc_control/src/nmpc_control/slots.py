@@ -6,8 +6,8 @@ from typing import List, Optional, Sequence
 import numpy as np
 
 from nmpc_control.errors import ProblemError
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.ocp import SLOT_SIZE
-from nmpc_control.state import Obstacle
 
 
 class Slots:

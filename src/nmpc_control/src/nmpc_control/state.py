@@ -9,9 +9,8 @@ rate
 reference [rad/s]; body frame FLU, so positive pitch is nose down.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
-from typing import Optional
 
 import numpy as np
 
@@ -90,40 +89,3 @@ class Plan:
         s = float(np.clip((t - self.t - self.delay) / self.dt, 0.0, self.horizon))
         k = min(int(s), self.horizon - 1)
         return self.states[k] + (s - k) * (self.states[k + 1] - self.states[k])
-
-
-@dataclass(frozen=True)
-class Obstacle:
-    """A sphere, vertical cylinder or axis-aligned box; the hull that must not be touched."""
-
-    id: str
-    position: np.ndarray  # (3,) [m] centre, world frame
-    size: (
-        np.ndarray
-    )  # [m] sphere: (radius,), cylinder: (radius, height), box: (3,) full edge lengths
-    shape: str = "sphere"
-    velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) [m/s]
-    stamp: Optional[float] = None  # [s] time of the position; None: it stands still
-
-    def position_at(self, t: float) -> np.ndarray:
-        """Return the centre (3,) [m] at time ``t`` [s], moving at constant velocity."""
-        if self.stamp is None:
-            return self.position
-        return self.position + (t - self.stamp) * self.velocity
-
-    def distance(self, points: np.ndarray, t: Optional[float] = None) -> np.ndarray:
-        """Return the distance [m] from points (..., 3) to the surface, negative inside."""
-        offset = np.asarray(points) - (self.position if t is None else self.position_at(t))
-        if self.shape == "sphere":
-            return np.linalg.norm(offset, axis=-1) - self.size[0]
-        if self.shape == "cylinder":
-            q = np.stack(
-                [
-                    np.linalg.norm(offset[..., :2], axis=-1) - self.size[0],
-                    np.abs(offset[..., 2]) - self.size[1] / 2,
-                ],
-                axis=-1,
-            )
-        else:
-            q = np.abs(offset) - self.size / 2
-        return np.linalg.norm(np.maximum(q, 0.0), axis=-1) + np.minimum(q.max(axis=-1), 0.0)

@@ -6,7 +6,7 @@ from typing import Any, Callable, Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from nmpc_control.state import Obstacle
+from nmpc_control.obstacle import Obstacle
 
 _MOST_OBSTACLES = 256  # in one message
 _MOST_POINTS = 200_000  # of one trajectory

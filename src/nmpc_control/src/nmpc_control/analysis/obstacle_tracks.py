@@ -7,7 +7,7 @@ import numpy as np
 
 from nmpc_control.analysis.record import ObstacleTrack, Series
 from nmpc_control.analysis.recording import Event
-from nmpc_control.state import Obstacle
+from nmpc_control.obstacle import Obstacle
 
 
 def obstacle_tracks(

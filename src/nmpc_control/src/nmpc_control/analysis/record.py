@@ -6,7 +6,7 @@ from typing import Any, Dict, Mapping, Optional, Tuple
 
 import numpy as np
 
-from nmpc_control.state import Obstacle
+from nmpc_control.obstacle import Obstacle
 
 # Columns of FlightRecord.solver and of FlightRecord.status; those of commands are in state.py.
 ITERATIONS, SOLVE_TIME, FOUND = 0, 1, 2

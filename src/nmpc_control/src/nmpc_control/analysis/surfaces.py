@@ -5,7 +5,7 @@ from typing import Tuple
 
 import numpy as np
 
-from nmpc_control.state import Obstacle
+from nmpc_control.obstacle import Obstacle
 
 _WITH_ENDS = 1.1  # stretches the heights so that two rows lie at each end
 

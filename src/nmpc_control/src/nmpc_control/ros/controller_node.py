@@ -34,6 +34,7 @@ from std_msgs.msg import Empty, Header
 
 from nmpc_control.controller import Controller
 from nmpc_control.errors import ConfigError, NmpcError
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters, load_parameters, load_weights
 from nmpc_control.ros.conversions import MessageError, obstacles_from_msg
 from nmpc_control.ros.publishers import Publishers
@@ -41,7 +42,7 @@ from nmpc_control.ros.subscriptions import Subscriptions
 from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
 from nmpc_control.rotations import rpy_from_quaternion
 from nmpc_control.scenario import Scenario, load_scenario
-from nmpc_control.state import POSITION, YAW, Goal, Obstacle, hover_input
+from nmpc_control.state import POSITION, YAW, Goal, hover_input
 from nmpc_msgs.msg import ControllerStatus, ObstacleArray
 
 _ENGAGED = (ControllerStatus.MODE_FLYING, ControllerStatus.MODE_HOVERING)

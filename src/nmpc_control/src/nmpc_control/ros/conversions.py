@@ -15,19 +15,10 @@ from nav_msgs.msg import Odometry
 from std_msgs.msg import Header
 
 from nmpc_control.errors import NmpcError
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.plan_check import MAX_HORIZON
 from nmpc_control.rotations import quaternion_from_rpy
-from nmpc_control.state import (
-    ATTITUDE,
-    NU,
-    NX,
-    POSITION,
-    VELOCITY,
-    YAW_RATE,
-    Goal,
-    Obstacle,
-    Plan,
-)
+from nmpc_control.state import ATTITUDE, NU, NX, POSITION, VELOCITY, YAW_RATE, Goal, Plan
 from nmpc_msgs.msg import ControlInput, ObstacleArray, Prediction
 from nmpc_msgs.msg import Obstacle as ObstacleMsg
 from nmpc_msgs.msg import Plan as PlanMsg

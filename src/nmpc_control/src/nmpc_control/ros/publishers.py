@@ -29,6 +29,7 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from nmpc_control.controller import Step
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.ros.conversions import (
     obstacles_to_msg,
     odometry_to_msg,
@@ -37,7 +38,7 @@ from nmpc_control.ros.conversions import (
 )
 from nmpc_control.rotations import quaternion_from_rpy
 from nmpc_control.scenario import Scenario
-from nmpc_control.state import POSITION, YAW, Obstacle
+from nmpc_control.state import POSITION, YAW
 from nmpc_msgs.msg import ObstacleArray, Plan, Prediction
 
 _SAMPLE_PERIOD = 0.05  # [s] of the published trajectory

@@ -7,8 +7,9 @@ import numpy as np
 
 from nmpc_control import dji
 from nmpc_control.analysis.record import FlightRecord, ObstacleTrack, Reference, Series
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.scenario import Scenario
-from nmpc_control.state import POSITION, VELOCITY, Obstacle
+from nmpc_control.state import POSITION, VELOCITY
 from uav_sim.body import BodyState
 from uav_sim.closed_loop.loop import Log
 from uav_sim.world import World

@@ -13,9 +13,10 @@ from nmpc_control.guard_data import Action, GuardOutput
 from nmpc_control.guard_inbox import GuardInbox
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.mode_inputs import PLANNED, STREAMING, Request
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters
 from nmpc_control.scenario import Scenario
-from nmpc_control.state import Obstacle, hover_input
+from nmpc_control.state import hover_input
 from uav_sim.body import BodyState
 from uav_sim.disturbance import Disturbance
 from uav_sim.errors import SimulatorError

@@ -11,9 +11,10 @@ from typing import List, Sequence
 import numpy as np
 
 from nmpc_control.nmpc import Nmpc
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters, load_parameters, load_weights
 from nmpc_control.scenario import Scenario, load_scenario
-from nmpc_control.state import NX, POSITION, VELOCITY, YAW, YAW_RATE, Obstacle, hover_input
+from nmpc_control.state import NX, POSITION, VELOCITY, YAW, YAW_RATE, hover_input
 from uav_sim.closed_loop.bench.problem import Problem, Recorder
 from uav_sim.closed_loop.bench.recording import PLANT, exact_solver
 

@@ -6,8 +6,8 @@ from typing import List
 
 import numpy as np
 
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.scenario import Scenario, load_scenario
-from nmpc_control.state import Obstacle
 from nmpc_control.trajectory import polyline
 
 _RADIUS = (0.3, 0.6)  # [m]
