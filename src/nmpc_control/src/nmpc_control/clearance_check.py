@@ -8,7 +8,7 @@ at every tick, and one that refused to hover because what it knows will be old w
 
 import math
 from dataclasses import replace
-from typing import List, NamedTuple, Sequence, Tuple, Union
+from typing import NamedTuple, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -66,44 +66,69 @@ def approach(
         radius: [m] of the hull.
         reach: [m] hull to surface.
     """
-    growth = obstacles.growth(np.array([t]))[:, 0]
-    nothing = Approach((), times, np.empty((0, len(times))), growth, points)
-    if not len(obstacles):
-        return nothing
+    for bound in (_bound_as_one, _bound_by_points):
+        if len(obstacles) > 1:
+            least = bound(points, times, t, obstacles) - radius
+            obstacles = _narrowed(points, times, t, obstacles, radius, reach, least)
+    return _refined(points, times, t, obstacles, radius)
+
+
+def _narrowed(
+    points: np.ndarray,
+    times: np.ndarray,
+    t: float,
+    obstacles: ObstacleField,
+    radius: float,
+    reach: float,
+    least: np.ndarray,
+) -> ObstacleField:
+    """Return those that matter, given what the clearances (n,) [m] are at least."""
+    closest = int(np.argmin(least))
+    only = ObstacleField([obstacles.obstacles[closest]])
+    nearest = float(_refined(points, times, t, only, radius).grown.min())
+    # what follows a path of its own may leave the straight line that the bound takes
+    keep = (least < max(reach, nearest)) | [o.path is not None for o in obstacles.obstacles]
+    keep[closest] = True
+    if keep.all():
+        return obstacles
+    return ObstacleField([obstacles.obstacles[i] for i in np.nonzero(keep)[0]])
+
+
+def _bound_as_one(
+    points: np.ndarray, times: np.ndarray, t: float, obstacles: ObstacleField
+) -> np.ndarray:
+    """Return the least distance (n,) [m] to surfaces by one sphere around the whole path."""
+    middle = len(times) // 2
+    ends = obstacles.centres(times[[0, middle, -1]])
+    travel = _lengths(ends - ends[:, 1:2]).max(axis=1)
+    extent = float(_lengths(points - points[middle]).max())
+    distance = _lengths(ends[:, 1] - points[middle]) - extent - travel
+    return distance - obstacles.bounding - obstacles.growth(np.array([t]))[:, 0]
+
+
+def _bound_by_points(
+    points: np.ndarray, times: np.ndarray, t: float, obstacles: ObstacleField
+) -> np.ndarray:
+    """Return the least distance (n,) [m] to surfaces by spheres around them and each point."""
     relative = points - obstacles.centres(times)
     chord = _lengths(np.diff(relative, axis=1)).max(axis=1, initial=0.0)
-    surface = _lengths(relative).min(axis=1) - obstacles.bounding - growth - radius
-    least = surface - chord / 2
-    # what follows a path of its own may leave the chord between two points
-    has_path = np.array([o.path is not None for o in obstacles.obstacles])
-    closest = int(np.argmin(least))
-    first = _refined(points, times, chord[[closest]], [closest], obstacles, growth, radius)
-    matters = (least < max(reach, float(first.grown.min()))) | has_path
-    matters[closest] = True
-    which = np.nonzero(matters)[0].tolist()
-    if which == [closest]:
-        return first
-    return _refined(points, times, chord[which], which, obstacles, growth, radius)
+    distance = _lengths(relative).min(axis=1) - chord / 2
+    return distance - obstacles.bounding - obstacles.growth(np.array([t]))[:, 0]
 
 
 def _refined(
-    points: np.ndarray,
-    times: np.ndarray,
-    chord: np.ndarray,
-    which: List[int],
-    obstacles: ObstacleField,
-    growth: np.ndarray,
-    radius: float,
+    points: np.ndarray, times: np.ndarray, t: float, obstacles: ObstacleField, radius: float
 ) -> Approach:
-    """Return the approach to some of the obstacles, at points at most ``SPACING`` apart."""
-    count = math.ceil(min(max(1.0, float(chord.max()) / SPACING), MAX_POINTS))
-    near = ObstacleField([obstacles.obstacles[i] for i in which])
+    """Return the approach to all of the obstacles, at points at most ``SPACING`` apart."""
+    chords = _lengths(np.diff(points - obstacles.centres(times), axis=1))
+    count = math.ceil(min(max(1.0, float(chords.max(initial=0.0)) / SPACING), MAX_POINTS))
     stages = np.arange(len(times))
     fine = np.linspace(0, len(times) - 1, count * (len(times) - 1) + 1)
     fine_times = np.interp(fine, stages, times)
     fine_points = np.stack([np.interp(fine, stages, points[:, i]) for i in range(3)], axis=1)
-    distance = near.distances(fine_points, fine_times) + near.growth(fine_times)
-    return Approach(near.ids, fine_times, distance - radius, growth[which], fine_points)
+    distance = obstacles.distances(fine_points, fine_times) + obstacles.growth(fine_times)
+    growth = obstacles.growth(np.array([t]))[:, 0]
+    return Approach(obstacles.ids, fine_times, distance - radius, growth, fine_points)
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:

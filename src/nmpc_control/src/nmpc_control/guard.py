@@ -2,9 +2,8 @@
 """The safety process without ROS: plan check, ladder, modes and the setpoint of one tick."""
 
 import math
-from collections import deque
 from dataclasses import dataclass, replace
-from typing import Callable, Deque, Optional, Sequence, Tuple
+from typing import Callable, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -27,20 +26,10 @@ from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.override import Override
 from nmpc_control.params import Limits, Vehicle
-from nmpc_control.prediction import predict
-from nmpc_control.state import (
-    PITCH,
-    PITCH_REF,
-    ROLL,
-    ROLL_REF,
-    THRUST,
-    VELOCITY,
-    hover_input,
-    hover_state,
-)
+from nmpc_control.sent_inputs import SentInputs
+from nmpc_control.state import THRUST, VELOCITY, hover_input
 from nmpc_control.verdict import Verdict
 
-INPUT_MEMORY = 2.0  # [s] inputs sent earlier cannot matter for the delay
 MAX_TICK = 0.1  # [s] a longer pause between ticks counts as this
 MAX_FAILURES = 10  # [1] ticks in a row that may raise before authority is released
 
@@ -60,6 +49,7 @@ class Guard:
         self.params = params
         self.vehicle = vehicle
         self.mode = Mode.WAITING
+        self._sent = SentInputs(vehicle)
         self.ladder = PlanLadder(params.plan_check, params.hold_timeout, vehicle, limits)
         self._brake = Brake(vehicle, limits, params.brake)
         self.override = Override(
@@ -93,7 +83,9 @@ class Guard:
         actions = self._change_mode(i, seen, answer)
         override = self._overridden(i, verdict, obstacles)
         command = self._command(i, seen, rung, dt, override)
-        self._remember(i.t, command)
+        if command.axes is not None:
+            self._sent.add(i.t, command.applied)
+        self._sent.trim(i.t)
         self._failures = 0
         return GuardOutput(
             mode=self.mode,
@@ -127,7 +119,7 @@ class Guard:
         self._reference_asked = -math.inf
         self._settled_since: Optional[float] = None
         self._last_good: Optional[StateEstimate] = None
-        self._inputs: Deque[Tuple[float, np.ndarray]] = deque()
+        self._sent.forget()
         self.ladder.forget()
         self.override.forget()
 
@@ -149,7 +141,7 @@ class Guard:
                 i.goal,
                 t=i.t,
                 state=state,
-                inputs=self._inputs,
+                inputs=self._sent.history,
                 obstacles=obstacles,
                 brake_clearance=brake_clearance,
             )
@@ -166,7 +158,7 @@ class Guard:
             i.t, i.obstacles_stale, state, obstacles, age, verdict.nearest
         )
         if reason and not was_active:
-            self._brake.begin(self._input_before(i))
+            self._brake.begin(self._sent.last(i.t, i.estimate))
         return reason
 
     def _seen(self, i: GuardInputs, rung: Rung, verdict: Verdict) -> ModeInputs:
@@ -233,7 +225,7 @@ class Guard:
             self.ladder.stop_expecting()
         if after is not before:
             if after in (Mode.BRAKING, Mode.LANDING):
-                self._brake.begin(self._input_before(i))
+                self._brake.begin(self._sent.last(i.t, i.estimate))
             self._enter(after, i.t, transition.reason)
         if self._wants_reference(i.t, seen):
             self._reference_asked = i.t
@@ -282,9 +274,7 @@ class Guard:
         """Return the state (10,) expected when a command sent now takes effect."""
         has_velocity = i.telemetry.velocity_age <= self.params.modes.velocity_timeout
         known = i.estimate if has_velocity and i.estimate is not None else self._last_good
-        if known is None:
-            return hover_state(np.zeros(3))
-        return predict(known.vector, known.t, i.t + self.vehicle.delay, self._inputs, self.vehicle)
+        return self._sent.state_in_effect(i.t, known)
 
     def _axes(self, u: Sequence[float], up: float) -> Tuple[dji.Axes, Tuple[float, ...]]:
         """Return the axes for an input (4,) and the input that they really command."""
@@ -297,24 +287,6 @@ class Guard:
 
     def _hold_axes(self) -> dji.Axes:
         return dji.velocity_axes((0.0, 0.0, 0.0), 0.0, self.params.setpoint_limits)
-
-    def _remember(self, t: float, command: _Command) -> None:
-        if command.axes is not None:
-            # DJI's own hold is not in the model; level hover is the nearest that is
-            u = hover_input() if command.applied is None else np.array(command.applied)
-            self._inputs.append((t, u))
-        while self._inputs and self._inputs[0][0] < t - INPUT_MEMORY:
-            self._inputs.popleft()
-
-    def _input_before(self, i: GuardInputs) -> np.ndarray:
-        """Return the input (4,) sent last, or the one that explains the present attitude."""
-        if self._inputs and i.t - self._inputs[-1][0] <= MAX_TICK:
-            return self._inputs[-1][1]
-        u = hover_input()
-        if i.estimate is not None:
-            u[ROLL_REF] = i.estimate.vector[ROLL] / self.vehicle.roll.gain
-            u[PITCH_REF] = i.estimate.vector[PITCH] / self.vehicle.pitch.gain
-        return u
 
     def _sentence(self, seen: ModeInputs, verdict: Verdict) -> str:
         if self.mode is Mode.WAITING:
