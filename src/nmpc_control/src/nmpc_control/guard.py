@@ -53,11 +53,7 @@ class Guard:
         self.ladder = PlanLadder(params.plan_check, params.hold_timeout, vehicle, limits)
         self._brake = Brake(vehicle, limits, params.brake)
         self.override = Override(
-            params.stopping,
-            params.brake,
-            vehicle,
-            1.0 / params.rate,
-            params.plan_check.clearance_horizon,
+            params.stopping, params.brake, vehicle, 1.0 / params.rate, params.plan_check
         )
         self._obstacles = ObstacleField(())
         self._converted: Sequence[Obstacle] = ()
@@ -153,9 +149,9 @@ class Guard:
             return ""
         was_active = self.override.active
         state = None if i.estimate is None else self._state_in_effect(i)
-        age = max(0.0, self.ladder.age(i.t))
+        plan = self.ladder.flown
         reason = self.override.reason(
-            i.t, i.obstacles_stale, state, obstacles, age, verdict.nearest
+            i.t, i.obstacles_stale, state, obstacles, plan, verdict.nearest
         )
         if reason and not was_active:
             self._brake.begin(self._sent.last(i.t, i.estimate))

@@ -54,7 +54,7 @@ class PlanLadder:
     def forget(self) -> None:
         """Drop everything that carries a time; the counts remain."""
         self.plan: Optional[Plan] = None
-        self._flown: Optional[Plan] = None  # with the states to which its inputs really lead
+        self.flown: Optional[Plan] = None  # with the states to which its inputs really lead
         self.goal = Goal.HOLD
         self.verified = 0  # [1] in a row
         self._verdict = Verdict(Finding.NOT_FOUND, "no plan has come")
@@ -111,7 +111,7 @@ class PlanLadder:
             self.verified = 0
             return
         self.plan, self.goal, self._is_new = plan, goal, True
-        self._flown = self._verdict.flown or plan
+        self.flown = self._verdict.flown or plan
         self.verified += 1
         if goal is Goal.HOLD:
             self._hold_since = None
@@ -167,7 +167,7 @@ class PlanLadder:
         else:
             rung = Rung.LAST_PLAN
             verdict = check_flown(
-                self._flown,
+                self.flown,
                 t=t,
                 vehicle=self.vehicle,
                 obstacles=obstacles,

@@ -13,8 +13,9 @@ import numpy as np
 from nmpc_control.braking import BrakeParameters
 from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.params import Vehicle
-from nmpc_control.state import VELOCITY
+from nmpc_control.state import VELOCITY, Plan
 from nmpc_control.stopping import StoppingParameters, clearance_of, shortfall, way_to_stop
+from nmpc_control.verdict import PlanCheckParameters
 
 
 class Override:
@@ -26,7 +27,7 @@ class Override:
         brake: BrakeParameters,
         vehicle: Vehicle,
         period: float,
-        horizon: float,
+        plan_check: PlanCheckParameters,
     ) -> None:
         """Begin without braking.
 
@@ -35,13 +36,14 @@ class Override:
             brake: the guard's own.
             vehicle: for hull and lags.
             period: [s] between two ticks.
-            horizon: [s] over which brake and plan are compared.
+            plan_check: for how long a plan is flown, and over which time it is judged.
         """
         self.params = params
         self.brake = brake
         self.vehicle = vehicle
         self.period = period
-        self.horizon = horizon
+        self.horizon = plan_check.clearance_horizon
+        self.plan_timeout = plan_check.timeout
         self.forget()
 
     def forget(self) -> None:
@@ -68,7 +70,7 @@ class Override:
         stale: str,
         state: Optional[np.ndarray],
         obstacles: ObstacleField,
-        plan_age: float,
+        plan: Optional[Plan],
         plan_clearance: float,
     ) -> str:
         """Return why to brake at ``t`` [s]; empty: the plan may be flown.
@@ -78,11 +80,11 @@ class Override:
             stale: why the obstacles are not known well enough; empty: they are.
             state: (10,) when a command sent now takes effect; None: unknown.
             obstacles: as known now.
-            plan_age: [s] of the plan that would be flown.
+            plan: that would be flown, with the states to which it leads.
             plan_clearance: [m] least that the plan keeps over the horizon.
         """
         self.remark = ""
-        reason = stale or self._no_room(t, state, obstacles, plan_age, plan_clearance)
+        reason = stale or self._no_room(t, state, obstacles, plan, plan_clearance)
         if reason and (stale or not self.active):
             self._until = t + self.params.dwell
         self._reason = reason or self._reason
@@ -94,23 +96,28 @@ class Override:
         t: float,
         state: Optional[np.ndarray],
         obstacles: ObstacleField,
-        plan_age: float,
+        plan: Optional[Plan],
         plan_clearance: float,
     ) -> str:
         p = self.params
-        if not p.enabled or state is None or obstacles.unusable:
+        if not p.enabled or state is None or plan is None or obstacles.unusable:
             return ""
         if float(np.linalg.norm(state[VELOCITY])) < p.least_speed:
             return ""
-        way = way_to_stop(state, self.vehicle, self.brake, self.period + plan_age, p.factor)
+        age = max(0.0, t - plan.t)
+        way = way_to_stop(state, self.vehicle, self.brake, self.period + age, p.factor)
         in_effect, radius = t + self.vehicle.delay, self.vehicle.radius
         room = p.release if self.active else 0.0
         found = shortfall(way, in_effect, obstacles, radius, p.margin, room)
         if found is None:
             return ""
+        # no other plan may come: then this one is flown until it is too old, and then the brake
+        later = in_effect + max(0.0, self.plan_timeout - age)
+        after = self.brake_clearance(plan.state_at(later), later, obstacles)
+        kept = min(plan_clearance, after)
         # a plan that leads past it is better than a brake that does not stop before it
-        gain = self.brake_clearance(state, in_effect, obstacles) - plan_clearance
+        gain = self.brake_clearance(state, in_effect, obstacles) - kept
         if gain > (-p.advantage if self.active else p.advantage):
             return str(found)
-        self.remark = f"{found}; the plan keeps {plan_clearance:.2f} m"
+        self.remark = f"{found}; the plan keeps {kept:.2f} m"
         return ""
