@@ -23,7 +23,7 @@ HEIGHT = 20.0  # [m]
 
 
 def following(velocity, gain=1.0, tilt=0.436):
-    """Return a solver whose plans turn to a velocity (3,) [m/s], within the bounds of the inputs."""
+    """Return a solver whose plans turn to a velocity (3,) [m/s], within the inputs' bounds."""
     return steered(lambda x, vehicle: gain * (np.asarray(velocity) - x[VELOCITY]), tilt)
 
 
@@ -158,4 +158,3 @@ class GuardedM100:
                 take[packet.topic](packet.t, packet.value)
         self.path.append(self.aircraft.truth.position)
         self.times.append(self.t)
-

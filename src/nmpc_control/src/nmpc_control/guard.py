@@ -173,11 +173,13 @@ class Guard:
         elif self._settled_since is None:
             self._settled_since = i.t
         blind = telemetry.position_age > p.modes.position_timeout and not self._gps_holds(telemetry)
+        # while it is held back for obstacles long unseen, what they may have grown to is no news
+        is_held = bool(i.obstacles_stale) and self.mode in PLANNED and self.ladder.is_blocked(i.t)
         return replace(
             telemetry,
             needs_gps=p.position_source == "gps",
             verified_plans=self.ladder.verified,
-            plan_usable=rung is not Rung.NONE and is_fresh,
+            plan_usable=(rung is not Rung.NONE or is_held) and is_fresh,
             plan_finding="" if verdict.ok else verdict.sentence,
             usable_time=self.ladder.usable_time(i.t) if is_fresh else 0.0,
             goal=self.ladder.goal,

@@ -117,7 +117,9 @@ class Override:
         kept = min(plan_clearance, after)
         # a plan that leads past it is better than a brake that does not stop before it
         gain = self.brake_clearance(state, in_effect, obstacles) - kept
-        if gain > (-p.advantage if self.active else p.advantage):
+        if self.active:
+            gain += 2.0 * p.advantage
+        if (kept < p.margin or self.active) and gain > p.advantage:
             return str(found)
         self.remark = f"{found}; the plan keeps {kept:.2f} m"
         return ""
