@@ -13,9 +13,12 @@ import numpy as np
 from nmpc_control.braking import BrakeParameters
 from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.params import Vehicle
-from nmpc_control.state import VELOCITY, Plan
+from nmpc_control.state import GRAVITY, VELOCITY, Plan
 from nmpc_control.stopping import StoppingParameters, clearance_of, shortfall, way_to_stop
-from nmpc_control.verdict import PlanCheckParameters
+from nmpc_control.verdict import PlanCheckParameters, Verdict
+
+# [1] on the braking distance at full deceleration: what it takes on both plants, not at worst
+EXPECTED = 1.1
 
 
 class Override:
@@ -61,7 +64,9 @@ class Override:
             t: [s] of that.
             obstacles: as known now.
         """
-        way = way_to_stop(state, self.vehicle, self.brake, self.period, 1.0)
+        swing = math.atan(self.brake.deceleration / GRAVITY) / self.brake.tilt_rate
+        latency = self.period + swing / 2.0
+        way = way_to_stop(state, self.vehicle, self.brake, latency, EXPECTED)
         return clearance_of(way, self.horizon, t, obstacles, self.vehicle.radius)
 
     def reason(
@@ -71,7 +76,7 @@ class Override:
         state: Optional[np.ndarray],
         obstacles: ObstacleField,
         plan: Optional[Plan],
-        plan_clearance: float,
+        verdict: Verdict,
     ) -> str:
         """Return why to brake at ``t`` [s]; empty: the plan may be flown.
 
@@ -81,10 +86,10 @@ class Override:
             state: (10,) when a command sent now takes effect; None: unknown.
             obstacles: as known now.
             plan: that would be flown, with the states to which it leads.
-            plan_clearance: [m] least that the plan keeps over the horizon.
+            verdict: on this plan, now.
         """
         self.remark = ""
-        reason = stale or self._no_room(t, state, obstacles, plan, plan_clearance)
+        reason = stale or self._no_room(t, state, obstacles, plan, verdict)
         if reason and (stale or not self.active):
             self._until = t + self.params.dwell
         self._reason = reason or self._reason
@@ -97,7 +102,7 @@ class Override:
         state: Optional[np.ndarray],
         obstacles: ObstacleField,
         plan: Optional[Plan],
-        plan_clearance: float,
+        verdict: Verdict,
     ) -> str:
         p = self.params
         if not p.enabled or state is None or plan is None or obstacles.unusable:
@@ -111,11 +116,7 @@ class Override:
         found = shortfall(way, in_effect, obstacles, radius, p.margin, room)
         if found is None:
             return ""
-        # no other plan may come: then this one is flown until it is too old, and then the brake
-        later = in_effect + max(0.0, self.plan_timeout - age)
-        after = self.brake_clearance(plan.state_at(later), later, obstacles)
-        kept = min(plan_clearance, after)
-        # a plan that leads past it is better than a brake that does not stop before it
+        kept = self._kept(in_effect, age, plan, verdict, obstacles)
         gain = self.brake_clearance(state, in_effect, obstacles) - kept
         if self.active:
             gain += 2.0 * p.advantage
@@ -123,3 +124,20 @@ class Override:
             return str(found)
         self.remark = f"{found}; the plan keeps {kept:.2f} m"
         return ""
+
+    def _kept(
+        self, t: float, age: float, plan: Plan, verdict: Verdict, obstacles: ObstacleField
+    ) -> float:
+        """Return how far [m] from obstacles one stays who flies the plan.
+
+        One that has just come and leads past them at a good distance is taken at its word. Of any
+        other the guard must be able to make the best should no more plans come: it flies it until
+        it is too old, and then brakes.
+        """
+        p = self.params
+        leads_past = verdict.nearest >= p.evasion and verdict.speed >= p.least_speed
+        if leads_past and age <= p.evasion_age:
+            return verdict.nearest
+        later = t + max(0.0, self.plan_timeout - age)
+        after = self.brake_clearance(plan.state_at(later), later, obstacles)
+        return min(verdict.nearest, after)
