@@ -6,15 +6,17 @@ from typing import Optional, Sequence, Union
 
 import numpy as np
 
+from nmpc_control import constraints
 from nmpc_control.ipopt import IpoptSolver
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.ocp import Instance, Structure
-from nmpc_control.packing import check_arguments, pack_stages, pack_theta
+from nmpc_control.ocp import Structure
+from nmpc_control.other_ways import OtherWays, Posed
+from nmpc_control.packing import check_arguments, pack_theta
 from nmpc_control.params import Parameters
-from nmpc_control.slots import Slots, clearance
+from nmpc_control.slots import Slots
 from nmpc_control.solution import Guess, Solution, shift
 from nmpc_control.sqp import SqpSolver
-from nmpc_control.state import GRAVITY, Plan, hover_input
+from nmpc_control.state import GRAVITY, POSITION, Plan, hover_input
 
 
 class Nmpc:
@@ -32,7 +34,9 @@ class Nmpc:
         )
         self._last: Optional[Solution] = None
         self._last_t = 0.0
-        self._obstacle_slots = Slots()
+        self._slots = Slots(p.obstacle_slots)
+        self._other_ways = OtherWays(shooting=p.backend == "compiled")
+        self.tracking_error = 0.0  # [m] by which plans have been missed lately; raises the margin
         self._disturbance = np.zeros(3)
         self._theta = self._pack_theta(parameters)
 
@@ -80,14 +84,51 @@ class Nmpc:
             ProblemError: a wrong shape; a time, reference or obstacle that is not finite.
         """
         check_arguments(t, x0, x_ref, u_before, u_ref, self.structure.horizon)
-        guess = self._guess(t)
-        slots = self._slots(t, obstacles, x_ref[:, :3] if guess is None else guess.states[:, :3])
-        stages = pack_stages(
-            self.structure, x_ref, hover_input(GRAVITY) if u_ref is None else u_ref, slots
-        )
-        solution = self.solver.solve(Instance(x0, u_before, stages, self._theta), guess)
+        problem = self._pose(t, x0, x_ref, u_before, obstacles, u_ref)
+        guess, reference = self._guess(t), x_ref[:, POSITION]
+        path = reference if guess is None else guess.states[:, POSITION]
+        instance = problem.instance(self._slots, [path, reference])
+        if guess is not None and guess.multipliers is not None:
+            guess.multipliers[:, [constraints.PILOT_BOUNDS + i for i in self._slots.renewed]] = 0.0
+        solution = self.solver.solve(instance, guess)
+        if problem.obstacles and self.parameters.avoidance.guides:
+            choice = self._other_ways.improve(
+                self.solver, problem, solution, self._slots, warm=guess is not None
+            )
+            solution, self._slots = choice.solution, choice.slots
         self._last, self._last_t = (solution, t) if solution.found else (None, 0.0)
-        return self.as_plan(t, solution, self._exceeded(solution, x0, slots))
+        return self.as_plan(t, solution, self._remark(solution, problem))
+
+    def _pose(
+        self,
+        t: float,
+        x0: np.ndarray,
+        x_ref: np.ndarray,
+        u_before: np.ndarray,
+        obstacles: Sequence[Obstacle],
+        u_ref: Optional[np.ndarray],
+    ) -> Posed:
+        """Return the problem without choice of slots; arguments as of ``solve``."""
+        avoidance = self.parameters.avoidance
+        margin, paper = self.parameters.vehicle.radius + avoidance.safety_distance, False
+        if avoidance.term == "potential":
+            reach, paper = avoidance.inflation, True  # Eq. 8 is taken as it stands
+        else:
+            reach = avoidance.cushion if avoidance.term == "barrier" else 0.0
+            margin += avoidance.allowance + self.tracking_error
+        return Posed(
+            structure=self.structure,
+            times=self.stage_times(t),
+            x0=x0,
+            u_before=u_before,
+            x_ref=x_ref,
+            u_ref=hover_input(GRAVITY) if u_ref is None else u_ref,
+            theta=self._theta,
+            obstacles=obstacles if avoidance.enabled else (),
+            margin=margin,
+            reach=reach,
+            between=not paper,
+        )
 
     def as_plan(self, t: float, solution: Solution, remark: str = "") -> Plan:
         """Return a solution as plan of time ``t`` [s], its status with a remark."""
@@ -108,15 +149,15 @@ class Nmpc:
     def _pack_theta(self, p: Parameters) -> np.ndarray:
         return pack_theta(p.vehicle, p.weights, p.limits, p.avoidance, self._disturbance)
 
-    def _exceeded(self, solution: Solution, x0: np.ndarray, slots: np.ndarray) -> str:
+    def _remark(self, solution: Solution, problem: Posed) -> str:
         """Return which softened bound the plan exceeds, or into which margin it begins; or ""."""
         if solution.softened:
             return f", {solution.softened} exceeded by {solution.violation:.2f}"
-        if self._obstacle_slots.left_out:
-            return f", {self._obstacle_slots.left_out} obstacles in reach have no slot"
-        avoidance = self.parameters.avoidance
-        inside = -clearance(slots[:, 0], x0[:3]).min(initial=np.inf) - avoidance.inflation
-        if avoidance.term == "potential" and inside > 0.0:
+        if self._slots.left_out:
+            return f", {self._slots.left_out} obstacles in reach have no slot"
+        now = self._slots.field.distances(problem.x0[None, POSITION], problem.times[:1])
+        inside = problem.margin - now.min(initial=np.inf)
+        if inside > 0.0 and problem.obstacles:
             return f", obstacle margin entered by {inside:.2f}"
         return ""
 
@@ -127,14 +168,3 @@ class Nmpc:
         if not 0.0 <= stages < self.structure.horizon / 2:
             return None
         return shift(self._last.guess, stages)
-
-    def _slots(self, t: float, obstacles: Sequence[Obstacle], path: np.ndarray) -> np.ndarray:
-        """Return the slot data of the obstacles nearest to the path (N + 1, 3)."""
-        avoidance = self.parameters.avoidance
-        if not avoidance.enabled:
-            obstacles = ()
-        margin = self.parameters.vehicle.radius + avoidance.safety_distance
-        if avoidance.term == "potential":
-            margin += avoidance.inflation  # it acts only inside its reach
-        slots = self.structure.obstacle_slots
-        return self._obstacle_slots.fill(obstacles, self.stage_times(t), path, margin, slots)

@@ -24,10 +24,11 @@ def pack_theta(
     Raises ProblemError on unusable numbers.
     """
     _check_numbers(vehicle, weights, limits, avoidance)
-    potential, hard = (
-        avoidance.enabled and avoidance.term == "potential",
-        avoidance.enabled and avoidance.term == "hard",
-    )
+    eta, begins = {
+        "potential": (avoidance.eta, avoidance.inflation),
+        "barrier": (avoidance.cushion_gain, avoidance.cushion),
+    }.get(avoidance.term, (0.0, 0.0))
+    hard = avoidance.enabled and avoidance.term != "potential"
     theta = np.concatenate(
         [
             model_parameters(vehicle, disturbance),
@@ -37,16 +38,16 @@ def pack_theta(
             weights.R_delta,
             limits.input_min,
             limits.input_max,
-            [avoidance.eta if potential else 0.0, limits.speed],
+            [eta if avoidance.enabled else 0.0, begins, limits.speed],
             limits.fence_min,
             limits.fence_max,
             limits.input_rate,
-            [limits.soft_weight, float(hard), 1.0],
+            [limits.soft_weight, avoidance.weight, float(hard), 1.0],
         ]
     )
     if not np.all(np.isfinite(theta)):
         raise ProblemError("parameters: got a value that is not finite")
-    for name in ("Q", "Q_f", "R", "R_delta", "eta", "soft_weight", "input_rate"):
+    for name in ("Q", "Q_f", "R", "R_delta", "eta", "soft_weight", "obstacle_weight", "input_rate"):
         if np.any(theta[PARTS[name]] < 0):
             raise ProblemError(f"{name}: got {theta[PARTS[name]]}, expected no negative value")
     for low, high in (("u_min", "u_max"), ("fence_min", "fence_max")):
@@ -85,6 +86,8 @@ def _check_numbers(
         ("radius", vehicle.radius),
         ("safety_distance", avoidance.safety_distance),
         ("inflation", avoidance.inflation),
+        ("cushion", avoidance.cushion),
+        ("allowance", avoidance.allowance),
     ):
         if not 0 <= value < np.inf:
             raise ProblemError(f"{name}: got {value}, expected a length")

@@ -120,15 +120,20 @@ class Limits:
 
 @dataclass(frozen=True)
 class Avoidance:
-    """Repulsive potential of Eq. 8, with the distance counted from the hull."""
+    """How obstacles enter the problem; distances are counted from the hull."""
 
     enabled: bool = field()
     term: str = field(
-        metadata={"choices": ("potential", "hard")}
-    )  # Eq. 8 in the cost, or Eq. 7 softened exactly
-    eta: float = _non_negative()  # gain of the potential
+        metadata={"choices": ("potential", "hard", "barrier")}
+    )  # Eq. 8 in the cost; Eq. 7 softened exactly; that, and a potential that begins before it
+    eta: float = _non_negative()  # gain of the potential where it is the term
     safety_distance: float = _non_negative()  # [m] hull to surface
-    inflation: float = _non_negative()  # [m] added to the distance at which the potential begins
+    inflation: float = _non_negative()  # [m] before the margin where the potential begins
+    cushion: float = _non_negative()  # [m] the same of the barrier
+    cushion_gain: float = _non_negative()  # of the barrier's potential
+    weight: float = _positive()  # [1/m] of the L1 penalty on Eq. 7
+    guides: bool = field()  # whether other ways round are tried while the reference is blocked
+    allowance: float = _non_negative()  # [m] added to the margin of Eq. 7: least tracking error
 
 
 @dataclass(frozen=True)
