@@ -80,7 +80,7 @@ class Controller:
         x = estimate.vector
         if not self.engaged:
             self.itinerary.hold(x[POSITION], x[YAW], "automatic flight ended")
-        self.itinerary.update(t, x[POSITION], x[VELOCITY])
+        self.itinerary.update(t, x[POSITION], x[VELOCITY], bool(self.nmpc.held_up_by))
 
         x0 = predict(x, t, t + self.parameters.vehicle.delay, self._inputs, self.parameters.vehicle)
         times = self.nmpc.stage_times(t)
