@@ -8,8 +8,9 @@ import numpy as np
 
 from nmpc_control import constraints
 from nmpc_control.ipopt import IpoptSolver
+from nmpc_control.model import DISTURBANCE
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.ocp import Structure
+from nmpc_control.ocp import PARTS, Structure
 from nmpc_control.other_ways import OtherWays, Posed
 from nmpc_control.packing import check_arguments, pack_theta
 from nmpc_control.params import Parameters
@@ -42,7 +43,6 @@ class Nmpc:
         self._other_ways = OtherWays(parameters.avoidance.guides, shooting=p.backend == "compiled")
         self.held_up_by: Tuple[str, ...] = ()  # obstacles before which the last plan waits
         self.tracking_error = 0.0  # [m] by which plans have been missed lately; raises the margin
-        self._disturbance = np.zeros(3)
         self._theta = self._pack_theta(parameters)
 
     def use(self, parameters: Parameters) -> None:
@@ -56,6 +56,16 @@ class Nmpc:
         parameters = replace(parameters, solver=self.parameters.solver)
         self._theta = self._pack_theta(parameters)
         self.parameters = parameters
+
+    def expect(self, disturbance: np.ndarray, tracking_error: float = 0.0) -> None:
+        """Take what was learnt in flight into the problem.
+
+        Args:
+            disturbance: (3,) [m/s^2] constant acceleration in the world frame.
+            tracking_error: [m] by which plans are missed; added to the margin of Eq. 7.
+        """
+        self.tracking_error = tracking_error
+        self._theta[PARTS["model"]][DISTURBANCE] = disturbance
 
     def reset(self) -> None:
         """Forget the last solution: the next solve starts from hover."""
@@ -154,7 +164,7 @@ class Nmpc:
         )
 
     def _pack_theta(self, p: Parameters) -> np.ndarray:
-        return pack_theta(p.vehicle, p.weights, p.limits, p.avoidance, self._disturbance)
+        return pack_theta(p.vehicle, p.weights, p.limits, p.avoidance)
 
     def _remark(self, solution: Solution, problem: Posed) -> str:
         """Return which softened bound the plan exceeds, or into which margin it begins; or ""."""

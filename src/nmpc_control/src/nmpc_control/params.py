@@ -76,6 +76,9 @@ class Vehicle:
         _positive()
     )  # [rad] the flight controller's own limit of the tilt vector's norm
     thrust_map: ThrustMap = field()
+    disturbance: np.ndarray = field(  # (3,) [m/s^2] constant acceleration in the world frame
+        default_factory=lambda: np.zeros(3), metadata={"length": 3}
+    )
 
 
 @dataclass(frozen=True)
@@ -189,6 +192,15 @@ class Flight:
 
 
 @dataclass(frozen=True)
+class Disturbance:
+    """How fast a constant disturbance is learnt and how large it may be."""
+
+    time_constant: float = field(metadata={"min": 0.05})  # [s]
+    horizontal: float = _non_negative()  # [m/s^2] largest on an axis; 0: none
+    vertical: float = _non_negative()  # [m/s^2] the same upward and downward
+
+
+@dataclass(frozen=True)
 class Parameters:
     """Everything the controller needs."""
 
@@ -198,6 +210,7 @@ class Parameters:
     avoidance: Avoidance
     solver: Solver
     flight: Flight
+    disturbance: Disturbance
 
 
 def load_vehicle(name: str, directory: Optional[Path] = None) -> Vehicle:
@@ -230,7 +243,10 @@ class _File:
     avoidance: Avoidance
     solver: Solver
     flight: Flight
+    disturbance: Disturbance
 
     def with_presets(self, vehicle: Vehicle, weights: Weights) -> Parameters:
         limits = self.limits.within(vehicle)
-        return Parameters(vehicle, weights, limits, self.avoidance, self.solver, self.flight)
+        return Parameters(
+            vehicle, weights, limits, self.avoidance, self.solver, self.flight, self.disturbance
+        )
