@@ -60,6 +60,7 @@ class Controller:
         self.nmpc = Nmpc(parameters)
         self.obstacles: Sequence[Obstacle] = ()
         self.engaged = False  # the guard flies these plans
+        self.braking = False  # it does not, but brakes and will again
         self._inputs: Deque[Tuple[float, np.ndarray]] = deque()
         self._unknown = -np.inf  # [s] when an input was sent last that the model does not have
         self._disturbance = DisturbanceEstimate(parameters.disturbance)
@@ -94,7 +95,9 @@ class Controller:
             return None
         x = estimate.vector
         if not self.engaged:
-            self.itinerary.hold(x[POSITION], x[YAW], "automatic flight ended")
+            self._stand_by(x)
+        else:
+            self.itinerary.resume(t)
         self.itinerary.update(t, x[POSITION], x[VELOCITY], bool(self.nmpc.held_up_by))
 
         vehicle = self._learn(t, x)
@@ -112,6 +115,13 @@ class Controller:
             clearance=self._clearance(x[None, POSITION], np.array([t])),
             predicted_clearance=self._clearance(plan.states[:, POSITION], times),
         )
+
+    def _stand_by(self, x: np.ndarray) -> None:
+        """Plan for where the aircraft is; a goal outlasts the guard's braking, nothing else."""
+        if self.braking:
+            self.itinerary.suspend(x[POSITION], x[YAW])
+        else:
+            self.itinerary.hold(x[POSITION], x[YAW], "automatic flight ended")
 
     def _learn(self, t: float, x: np.ndarray) -> Vehicle:
         """Return the model with what it was found to lack, also told to the optimiser."""
