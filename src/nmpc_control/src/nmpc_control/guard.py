@@ -55,11 +55,7 @@ class Guard:
         self.ladder = PlanLadder(params.plan_check, params.hold_timeout, vehicle, limits)
         self._brake = Brake(vehicle, limits, params.brake)
         self.override = Override(
-            params.stopping,
-            params.brake,
-            vehicle,
-            1.0 / params.rate,
-            params.plan_check.clearance_horizon,
+            params.stopping, params.brake, vehicle, 1.0 / params.rate, params.plan_check
         )
         self._obstacles = ObstacleField(())
         self._converted: Sequence[Obstacle] = ()
@@ -171,10 +167,8 @@ class Guard:
             return ""
         was_active = self.override.active
         state = None if i.estimate is None else self._state_in_effect(i)
-        age = max(0.0, self.ladder.age(i.t))
-        reason = self.override.reason(
-            i.t, i.obstacles_stale, state, obstacles, age, verdict.nearest
-        )
+        plan = self.ladder.flown
+        reason = self.override.reason(i.t, i.obstacles_stale, state, obstacles, plan, verdict)
         if reason and not was_active:
             self._brake.begin(self._sent.last(i.t, i.estimate))
         return reason
@@ -195,11 +189,13 @@ class Guard:
         elif self._settled_since is None:
             self._settled_since = i.t
         blind = telemetry.position_age > p.modes.position_timeout and not self._gps_holds(telemetry)
+        # while it is held back for obstacles long unseen, what they may have grown to is no news
+        is_held = bool(i.obstacles_stale) and self.mode in PLANNED and self.ladder.is_blocked(i.t)
         return replace(
             telemetry,
             needs_gps=p.position_source == "gps",
             verified_plans=self.ladder.verified,
-            plan_usable=rung is not Rung.NONE and is_fresh,
+            plan_usable=(rung is not Rung.NONE or is_held) and is_fresh,
             plan_finding="" if verdict.ok else verdict.sentence,
             usable_time=self.ladder.usable_time(i.t) if is_fresh else 0.0,
             goal=self.ladder.goal,
