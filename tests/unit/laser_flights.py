@@ -41,7 +41,10 @@ def rocking(t):
     acceleration = -w * w * np.array([position[0], position[1]])
     yaw = 0.4 * math.sin(0.7 * t)
     c, s = math.cos(yaw), math.sin(yaw)
-    forward, left = c * acceleration[0] + s * acceleration[1], c * acceleration[1] - s * acceleration[0]
+    forward, left = (
+        c * acceleration[0] + s * acceleration[1],
+        c * acceleration[1] - s * acceleration[0],
+    )
     return position, np.array([-left / 9.81, forward / 9.81, yaw])
 
 
@@ -113,7 +116,9 @@ class Flight:
         stamp, estimator = START + t, self.poses.estimator
         estimator.add_imu(stamp, _body_rates(rpy, (turned - rpy) / h))
         if self._ticks % 4 == 0:
-            estimator.add_velocity(stamp, (ahead - position) / h + noise(0.0, 1.0, 3) * self.noise[1])
+            estimator.add_velocity(
+                stamp, (ahead - position) / h + noise(0.0, 1.0, 3) * self.noise[1]
+            )
             estimator.add_position(stamp, position + noise(0.0, 1.0, 3) * self.noise[0])
         heard = rpy + noise(0.0, 1.0, 3) * self.noise[2]
         self.poses.add_attitude(stamp, quaternion_from_rpy(*heard))
@@ -128,9 +133,7 @@ def errors(flight, duration, settle):
     found, ids = {}, {}
     for _, tracks in flight.run(duration, settle):
         for name, (position, velocity) in flight.truth().items():
-            near = min(
-                tracks, key=lambda o: np.hypot(*(o.position[:2] - position)), default=None
-            )
+            near = min(tracks, key=lambda o: np.hypot(*(o.position[:2] - position)), default=None)
             off = 1.0 if near is None else float(np.hypot(*(near.position[:2] - position)))
             speed = 1.0 if near is None else float(np.hypot(*(near.velocity[:2] - velocity)))
             found.setdefault(name, []).append((min(off, 1.0), speed))

@@ -2,7 +2,9 @@
 """Echoes of one surface: neighbours no farther apart than their range explains.
 
 The gap grows with range as in Borges and Aldon, "Line extraction in 2D range images for mobile
-robotics", Journal of Intelligent and Robotic Systems 40, 2004 (adaptive breakpoint detector).
+robotics", Journal of Intelligent and Robotic Systems 40, 2004 (adaptive breakpoint detector). A
+beam that an edge cuts in two may show a point between foreground and background: farther from both
+than that gap, it belongs to neither, and alone it is no cluster.
 """
 
 from typing import List

@@ -120,7 +120,7 @@ def _edge(view: View, beam: int, side: int) -> Optional[float]:
     other %= n
     if view.kinds[other] in (Beam.UNKNOWN, Beam.GROUND):
         return None
-    if view.kinds[other] != Beam.VEIL and view.reach[other] < view.reach[beam] + _OCCLUDER:
+    if view.reach[other] < view.reach[beam] + _OCCLUDER:
         return None
     bearing = view.bearings[beam]
     return bearing + 0.5 * math.remainder(view.bearings[other] - bearing, math.tau)

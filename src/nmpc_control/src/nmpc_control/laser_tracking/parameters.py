@@ -32,6 +32,7 @@ class PoseParameters:
 
     delay: float = field(metadata={"min": 0.0, "max": 1.0})  # [s] telemetry shows what was then
     max_age: float = _positive()  # [s] of telemetry at the time of a beam
+    gain: float = field(metadata={"min": 0.01, "max": 1.0})  # [1] of a sample
     position_sigma: float = _not_negative()  # [m]
     heading_sigma: float = _not_negative()  # [rad]
 
@@ -44,7 +45,6 @@ class EchoParameters:
     min_range: float = _not_negative()  # [m] nearer is the aircraft itself
     max_range: float = _positive()  # [m] farther is not tracked
     sigma: float = _positive()  # [m] of a range
-    veil_jump: float = _positive()  # [m] a range this far from both neighbours, between them
     ground_height: float = field()  # [m] of flat ground in the world frame
     ground_margin: float = _not_negative()  # [m] echoes lower than this above it are ground
     ground_angle: float = _not_negative()  # [rad] the margin grows by this with range

@@ -27,8 +27,7 @@ class Beam(IntEnum):
     UNKNOWN = 0  # nothing: not a number, too near, or no such range
     FREE = 1  # nothing within range
     ECHO = 2  # a surface
-    VEIL = 3  # an edge and what is behind it, mixed
-    GROUND = 4
+    GROUND = 3
 
 
 @dataclass(frozen=True)
@@ -93,27 +92,4 @@ def judge(scan: Scan, echoes: EchoParameters) -> np.ndarray:
     kinds = np.full(len(r), Beam.UNKNOWN)
     kinds[r > farthest] = Beam.FREE
     kinds[(r >= max(scan.range_min, echoes.min_range)) & (r <= farthest)] = Beam.ECHO
-    kinds[_veils(np.where(kinds == Beam.FREE, farthest, r), kinds, scan, echoes)] = Beam.VEIL
     return kinds
-
-
-def _veils(r: np.ndarray, kinds: np.ndarray, scan: Scan, echoes: EchoParameters) -> np.ndarray:
-    """Return which echoes (n,) lie between their neighbours' ranges, on the surface of neither.
-
-    Such points come from a beam that is partly cut by an edge. The neighbours on both sides have to
-    be off by the jump, and by more than on a surface seen at 7 degrees.
-    """
-    jump = np.maximum(echoes.veil_jump, 8.0 * abs(scan.angle_increment) * r)
-    before, after = (_turned(r, kinds, shift, scan.is_closed) for shift in (1, -1))
-    rising = (r - before > jump) & (after - r > jump)
-    falling = (before - r > jump) & (r - after > jump)
-    return (kinds == Beam.ECHO) & (rising | falling)
-
-
-def _turned(r: np.ndarray, kinds: np.ndarray, shift: int, is_closed: bool) -> np.ndarray:
-    """Return the range of the neighbour (n,) [m], nan where it says nothing."""
-    neighbour = np.where(kinds == Beam.UNKNOWN, np.nan, r)
-    neighbour = np.roll(neighbour, shift)
-    if not is_closed:
-        neighbour[0 if shift > 0 else -1] = np.nan
-    return neighbour

@@ -43,11 +43,11 @@ def look(scan: Scan, poses: np.ndarray, parameters: LaserTrackerParameters) -> V
     directions = np.einsum("nij,nj->ni", attitude, beams)
 
     farthest = min(scan.range_max, echoes.max_range)
-    ranges = np.where(np.isin(kinds, (Beam.ECHO, Beam.VEIL)), scan.ranges, farthest)
+    ranges = np.where(kinds == Beam.ECHO, scan.ranges, farthest)
     points = origins + ranges[:, None] * directions
     margin = echoes.ground_margin + echoes.ground_angle * ranges
     is_low = points[:, 2] < echoes.ground_height + margin
-    kinds[np.isin(kinds, (Beam.ECHO, Beam.VEIL)) & is_low] = Beam.GROUND
+    kinds[(kinds == Beam.ECHO) & is_low] = Beam.GROUND
     flat = np.maximum(np.hypot(directions[:, 0], directions[:, 1]), 1e-6)
     reach = np.where(kinds == Beam.UNKNOWN, 0.0, ranges * flat)
     order = slice(None, None, 1 if scan.angle_increment > 0.0 else -1)
