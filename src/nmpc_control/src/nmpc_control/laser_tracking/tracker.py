@@ -19,6 +19,7 @@ from nmpc_control.laser_tracking.view import View, look
 from nmpc_control.obstacle import Obstacle
 
 RESTART = 1.0  # [s] back or ahead: another clock or another time, nothing known holds
+AHEAD = 0.05  # [s] by which a scan may be from the future
 _BEHIND = 0.3  # [m] past the centre that beams have to get to count as having gone through
 _ABOVE = 0.2  # [m] outside the heights at which it was seen, in which it would still be seen
 _WALL_APART = 0.4  # [m] nearer than this two pieces of wall are one
@@ -38,13 +39,20 @@ class LaserTracker:
         """Drop all tracks, as after a jump of the clock; names are not used again."""
         self._tracks, self.t = [], -math.inf
 
-    def update(self, scan: Scan, poses: PoseHistory) -> None:
+    def update(self, scan: Scan, poses: PoseHistory, now: float = math.inf) -> None:
         """Take a scan.
+
+        Args:
+            scan: as it came.
+            poses: of the aircraft, up to the time of the scan.
+            now: [s] a scan from later is refused.
 
         Raises:
             ScanError: it cannot be used; it is counted, and tracks stay as they were.
         """
         try:
+            if scan.t > now + AHEAD:
+                raise ScanError("stamp", f"scan from {scan.t - now:.2f} s in the future")
             self._update(scan, poses)
         except ScanError as error:
             self.counts[error.kind] += 1
