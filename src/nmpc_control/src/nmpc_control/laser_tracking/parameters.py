@@ -32,7 +32,9 @@ class PoseParameters:
 
     delay: float = field(metadata={"min": 0.0, "max": 1.0})  # [s] telemetry shows what was then
     max_age: float = _positive()  # [s] of telemetry at the time of a beam
-    gain: float = field(metadata={"min": 0.01, "max": 1.0})  # [1] of a sample
+    frame_time: float = _positive()  # [s] in which what is told follows a wandering position
+    position_time: float = _positive()  # [s] in which a position wins over carried-on velocity
+    attitude_time: float = _positive()  # [s] in which an attitude wins over carried-on body rates
     position_sigma: float = _not_negative()  # [m]
     heading_sigma: float = _not_negative()  # [rad]
 

@@ -25,13 +25,17 @@ class PoseHistory:
     """The estimator's states at the stamps of attitude, and between them, with less noise.
 
     From stamp to stamp velocity and body rates carry the pose on, and each sample corrects it by a
-    share: white noise of an attitude, 10 m away from the aircraft, would look like motion.
+    share: noise of an attitude, 10 m away from the aircraft, and of a position would look like
+    motion of what is seen. Where the telemetry's position wanders meanwhile, ``shift`` tells it.
     """
 
     def __init__(self, parameters: PoseParameters) -> None:
         self.estimator = Estimator()
         self._parameters = parameters
         self._poses: Deque[_Pose] = deque(maxlen=_KEPT)
+        self.shift = np.zeros(3)  # [m] from the positions of ``at`` to those of the telemetry
+        times = (parameters.position_time, parameters.attitude_time)
+        self._times = np.repeat(times, 3)  # (6,) [s]
 
     def add_attitude(self, t: float, quaternion: Sequence[float]) -> bool:
         """Take a quaternion (x, y, z, w), body FLU to world ENU, of ``t`` [s]; False if refused.
@@ -45,13 +49,17 @@ class PoseHistory:
             return True
         pose = told.vector[:6]
         rates = (ahead.vector[:6] - pose) / _LOOK_AHEAD
+        shift = np.zeros(3)
         if self._poses:
             last = self._poses[-1]
             expected = last.pose + 0.5 * (t - last.t) * (last.rates + rates)
             off = pose - expected
             is_near = np.abs(off[:3]).max() < _JUMP and np.abs(off[3:]).max() < _TURN
             if is_near and t - last.t <= self._parameters.max_age:
-                pose = expected + self._parameters.gain * off
+                pose = expected + np.minimum(1.0, (t - last.t) / self._times) * off
+                share = min(1.0, (t - last.t) / self._parameters.frame_time)
+                shift = self.shift + share * (told.vector[:3] - pose[:3] - self.shift)
+        self.shift = shift
         self._poses.append(_Pose(t, pose, rates))
         return True
 
@@ -59,6 +67,7 @@ class PoseHistory:
         """Drop everything, as after a jump of the clock."""
         self.estimator.forget()
         self._poses.clear()
+        self.shift = np.zeros(3)
 
     def at(self, times: np.ndarray) -> Optional[np.ndarray]:
         """Return position [m], roll, pitch, yaw [rad] (n, 6) at times (n,) [s]; None if not known.

@@ -33,6 +33,7 @@ class LaserTracker:
         self.counts: Dict[str, int] = Counter()  # scans taken, and scans refused by kind
         self.t = -math.inf  # [s] of the newest scan
         self._tracks: List[Track] = []
+        self._shift = np.zeros(3)  # [m] from where tracks are to where they are told to be
         self._named = 0
 
     def forget(self) -> None:
@@ -73,7 +74,7 @@ class LaserTracker:
             found.append(
                 Obstacle(
                     id=f"laser_{track.number}",
-                    position=np.array([track.x[0], track.x[1], 0.5 * (top + bottom)]),
+                    position=np.array([*track.x[:2], 0.5 * (top + bottom)]) + self._shift,
                     size=np.array([track.reported_radius, top - bottom]),
                     shape="cylinder",
                     velocity=np.array([*track.reported_velocity, 0.0]),
@@ -93,7 +94,7 @@ class LaserTracker:
         if known is None:
             raise ScanError("pose", "scan refused: where the aircraft was is not known")
         dt = scan.t - self.t if self._tracks else 0.0
-        self.t = scan.t
+        self.t, self._shift = scan.t, poses.shift
         view = look(scan, known, self.parameters)
         found = self._detect(view)
         for track in self._tracks:

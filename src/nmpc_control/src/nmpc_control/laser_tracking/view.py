@@ -37,10 +37,11 @@ def look(scan: Scan, poses: np.ndarray, parameters: LaserTrackerParameters) -> V
     angles = scan.angles
     beams = np.stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))], axis=1)
     beams = beams @ _matrix(np.array([mount.rpy]))[0].T
-    rpy = poses[:, 3:] * (0.0, 0.0, 1.0) if mount.level else poses[:, 3:]
-    attitude = _matrix(rpy)  # (n, 3, 3)
+    known = poses if scan.time_increment > 0.0 else poses[:1]  # at one instant one does for all
+    rpy = known[:, 3:] * (0.0, 0.0, 1.0) if mount.level else known[:, 3:]
+    attitude = _matrix(rpy)  # (n or 1, 3, 3)
     origins = poses[:, :3] + attitude @ np.asarray(mount.position)
-    directions = np.einsum("nij,nj->ni", attitude, beams)
+    directions = (attitude @ beams[..., None])[..., 0]
 
     farthest = min(scan.range_max, echoes.max_range)
     ranges = np.where(kinds == Beam.ECHO, scan.ranges, farthest)
