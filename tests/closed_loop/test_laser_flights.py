@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Laser tracking from the simulated aircraft itself: its tilt, its delays, its noisy telemetry."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -18,6 +19,7 @@ from uav_sim.world import World
 
 VELOCITY = float(0x49)  # control byte: east, north, up [m/s], yaw rate [rad/s], ground frame
 START = 50.0  # [s]
+PARAMETERS = load_laser_parameters()
 SETTLE = 2.0  # [s]
 CROSSING = [
     {
@@ -36,17 +38,16 @@ def weave(t):
     return 0.8 * math.sin(1.1 * t), 1.5 * math.cos(0.9 * t), 0.0, 0.25 * math.cos(0.7 * t)
 
 
-def track(preset, level, laser, seed, duration=4.0, obstacles=CROSSING):
+def track(preset, level, laser, seed, duration=4.0, parameters=PARAMETERS):
     """Return errors (k, 2) of position [m] and velocity [m/s] of the only obstacle, and the ids.
 
     Positions are compared in the frame of ``local_position``: its slow error is not the laser's.
     """
     plant = load_preset(preset)
-    world = World.from_list(obstacles, plant.radius)
+    world = World.from_list(CROSSING, plant.radius)
     sim = SimulatedM100(plant, world, Disturbance(load_disturbance(level), seed))
     sim.laser = Laser(load_laser(laser), str(seed))
     sim.place((0.0, 0.0, 3.0), authority=True)
-    parameters = load_laser_parameters()
     tracker, poses = LaserTracker(parameters), PoseHistory(parameters.pose)
     hear = {
         "imu": lambda t, v: poses.estimator.add_imu(t, v.angular_velocity),
@@ -91,3 +92,10 @@ def test_a_walker_seen_from_an_aircraft_that_weaves(preset, level, laser):
     rows, ids, count = track(preset, level, laser, seed=2)
     assert ids == {"laser_1"} and count == 1
     assert rows[:, 0].max() < 0.15 and rows[:, 1].max() < 0.3
+
+
+def test_without_carrying_poses_on_their_noise_would_be_motion():
+    raw = dataclasses.replace(PARAMETERS.pose, position_time=0.01, attitude_time=0.01)
+    parameters = dataclasses.replace(PARAMETERS, pose=raw)
+    rows, _, _ = track("dji_hil", "outdoor", "utm_30lx", seed=2, parameters=parameters)
+    assert rows[:, 1].max() > 0.35

@@ -15,7 +15,7 @@ from sensor_msgs.msg import LaserScan
 
 from nmpc_msgs.msg import ObstacleArray
 
-SETTLE, WATCHED = 1.0, 2.0  # [s] after the first track, [s]
+SETTLE, WATCHED = 0.8, 1.5  # [s] after the first track, [s]
 
 
 class Client:

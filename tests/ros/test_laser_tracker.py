@@ -25,12 +25,12 @@ def test_tracks_are_near_truth_and_rubbish_is_counted(ros):
     ros.start("rosrun", "nmpc_control", "laser_tracker")
     ros.wait_for_node("/laser_tracker")
     result = ros.run_json("laser_client.py", timeout=60)
-    assert result["compared"] > 30
+    assert result["compared"] > 20
     assert result["position"] < 0.15 and result["speed"] < 0.3
     assert result["names"] == ["laser_1"] and result["frames"] == ["world"]
     assert 0.0 < result["growth"] <= 0.5
     counted = result["diagnoses"]
     for kind in ("beams", "angles", "stamp"):
         assert int(counted[f"scans not taken: {kind}"]) > 0, counted
-    assert int(counted["scans"]) > 50
+    assert int(counted["scans"]) > 30
     assert "Traceback" not in ros.output_of_all()

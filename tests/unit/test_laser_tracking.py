@@ -15,7 +15,7 @@ POSITION, SPEED = 0.15, 0.3  # [m], [m/s] what is asked for at 10 m and 1 m/s
 SETTLE = 0.6  # [s] from the first echo on
 EXACT = (0.0, 0.0, 0.0)
 OUTDOOR = (0.05, 0.1, math.radians(0.5))  # noise of telemetry
-CROSSING = cylinder("a", (9.6, -1.0), (0.0, 1.0, 0.0), radius=0.25)
+CROSSING = cylinder("a", (10.0, -1.0), (0.0, 1.0, 0.0), radius=0.25)
 
 
 def worst(flight, duration, settle=SETTLE):
