@@ -9,6 +9,7 @@ import numpy as np
 
 from nmpc_control import dji, modes
 from nmpc_control.braking import Brake
+from nmpc_control.disturbance_estimate import DisturbanceEstimate
 from nmpc_control.estimator import StateEstimate
 from nmpc_control.guard_data import Action, GuardInputs, GuardOutput
 from nmpc_control.guard_params import GuardParameters
@@ -31,6 +32,7 @@ from nmpc_control.state import THRUST, VELOCITY, hover_input
 from nmpc_control.verdict import Verdict
 
 MAX_TICK = 0.1  # [s] a longer pause between ticks counts as this
+FORGOTTEN = 0.5  # [s] after its effect an input no longer shows in the attitude
 MAX_FAILURES = 10  # [1] ticks in a row that may raise before authority is released
 
 
@@ -57,6 +59,7 @@ class Guard:
         )
         self._obstacles = ObstacleField(())
         self._converted: Sequence[Obstacle] = ()
+        self._disturbance = DisturbanceEstimate(params.disturbance)
         self._reason = ""
         self._failures = 0
         self._forget(-math.inf)
@@ -67,6 +70,7 @@ class Guard:
             self._forget(i.t)
         dt, self._t = min(max(i.t - self._t, 0.0), MAX_TICK), i.t
         obstacles = self._as_field(i.obstacles)
+        self._learn(i)
 
         def brake_clearance() -> float:
             state, when = self._state_in_effect(i), i.t + self.vehicle.delay
@@ -116,8 +120,22 @@ class Guard:
         self._settled_since: Optional[float] = None
         self._last_good: Optional[StateEstimate] = None
         self._sent.forget()
+        self._disturbance.reset()
         self.ladder.forget()
         self.override.forget()
+
+    def _learn(self, i: GuardInputs) -> None:
+        """Take what the model lacks into it; only plans are flown by inputs that it has."""
+        estimate, vehicle = self._disturbance, self.vehicle
+        if self.mode not in PLANNED:
+            estimate.reset()
+        elif i.t - self._sent.unknown < vehicle.delay + FORGOTTEN or i.estimate is None:
+            estimate.pause()
+        else:
+            history, known = self._sent.history, self._sent.vehicle
+            estimate.update(i.t, i.estimate.vector, history, known)
+        push = vehicle.disturbance + estimate.acceleration
+        self._sent.vehicle = self.ladder.vehicle = replace(vehicle, disturbance=push)
 
     def _as_field(self, obstacles: Sequence[Obstacle]) -> ObstacleField:
         """Return obstacles as arrays, made once for each tuple of them."""

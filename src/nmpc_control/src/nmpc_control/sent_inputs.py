@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The inputs that were really sent lately, and the state to which they lead."""
 
+import math
 from collections import deque
 from typing import Deque, Optional, Sequence, Tuple
 
@@ -21,13 +22,17 @@ class SentInputs:
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
         self.history: Deque[Tuple[float, np.ndarray]] = deque()  # (time sent [s], input (4,))
+        self.unknown = -math.inf  # [s] when something was sent last that the model does not have
 
     def forget(self) -> None:
         """Drop all, as when the clock went backwards."""
         self.history.clear()
+        self.unknown = -math.inf
 
     def add(self, t: float, applied: Optional[Sequence[float]]) -> None:
         """Take what was sent at ``t`` [s]; None: a setpoint of DJI's own velocity control."""
+        if applied is None:
+            self.unknown = t
         # that is not in the model; level hover is the nearest that is
         self.history.append((t, hover_input() if applied is None else np.array(applied)))
 
