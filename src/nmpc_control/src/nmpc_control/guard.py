@@ -305,6 +305,5 @@ class Guard:
     def _sentence(self, seen: ModeInputs, verdict: Verdict) -> str:
         if self.mode is Mode.WAITING:
             return "; ".join(preflight(seen, self.params.modes)) or self._reason
-        if self.mode not in PLANNED:
-            return self._reason
-        return self.override.remark or verdict.sentence
+        planned = self.override.remark or verdict.sentence
+        return planned if self.mode in PLANNED else self._reason
