@@ -41,21 +41,24 @@ def times(act, count):
     return result
 
 
+def tick_times(count):
+    """Return the times [ms] of the clearance check alone, and of ticks with one new plan."""
+    flight = Flight(aircraft=Aircraft().airborne(START)).hovering()
+    flight.aircraft.airborne(START, [2.0, 0.0, 0.0])
+    flight.obstacles = scattered(count, flight.t)
+    state = hover_state(START)
+    state[6] = 2.0
+    plan, field = make_plan(state, flight.t), as_field(flight.obstacles)
+    check = times(lambda: check_clearance(plan, flight.t, VEHICLE, field, PARAMS.plan_check), 100)
+    offered = iter([(plan, Goal.TRAJECTORY)])
+    flight.solver = lambda t, x: next(offered, (None, Goal.HOLD))
+    return check, times(flight.tick, 20)
+
+
 def main():
     """Print one line for each number of obstacles."""
     for count in (0, 16, 64, 256):
-        flight = Flight(aircraft=Aircraft().airborne(START)).hovering()
-        flight.aircraft.airborne(START, [2.0, 0.0, 0.0])
-        flight.obstacles = scattered(count, flight.t)
-        state = hover_state(START)
-        state[6] = 2.0
-        plan, field = make_plan(state, flight.t), as_field(flight.obstacles)
-        check = times(
-            lambda: check_clearance(plan, flight.t, VEHICLE, field, PARAMS.plan_check), 100
-        )
-        offered = iter([(plan, Goal.TRAJECTORY)])
-        flight.solver = lambda t, x: next(offered, (None, Goal.HOLD))
-        ticks = times(flight.tick, 20)  # one verified plan, then the last one checked again
+        check, ticks = tick_times(count)
         line = f"{count:4d} obstacles: clearance {statistics.median(check):.2f} ms, tick "
         sys.stdout.write(f"{line}{statistics.median(ticks):.2f} ms, worst {max(ticks):.2f} ms\n")
 

@@ -167,8 +167,7 @@ class Guard:
             return ""
         was_active = self.override.active
         state = None if i.estimate is None else self._state_in_effect(i)
-        plan = self.ladder.flown
-        reason = self.override.reason(i.t, i.obstacles_stale, state, obstacles, plan, verdict)
+        reason = self.override.reason(i.t, i.obstacles_stale, state, obstacles, verdict)
         if reason and not was_active:
             self._brake.begin(self._sent.last(i.t, i.estimate))
         return reason
