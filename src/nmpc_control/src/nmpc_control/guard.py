@@ -100,7 +100,7 @@ class Guard:
         """Return what to do after ``tick`` raised: brake as simply as possible, then release."""
         self._failures += 1
         reason = f"the guard itself failed: {type(error).__name__}: {error}"
-        pilot = modes.pilot_has_control(telemetry, self.params.modes)
+        pilot = pilot_has_control(telemetry, self.params.modes)
         if self._failures <= MAX_FAILURES:
             if self.mode not in STREAMING or pilot:
                 return GuardOutput(self.mode, Rung.NONE, reason)

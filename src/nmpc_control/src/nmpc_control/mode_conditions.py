@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+"""What a rule of the mode table is, and the conditions that several of them share."""
+
+from dataclasses import dataclass
+from typing import Callable, Tuple
+
+from nmpc_control.dji import FlightStatus, RcMode
+from nmpc_control.mode_inputs import Mode, ModeInputs, ModeParameters, Request
+from nmpc_control.preflight import preflight
+
+Condition = Callable[[ModeInputs, ModeParameters], bool]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """From any of ``modes`` to ``to`` if ``when``; ``reason`` is formatted with ``i`` and ``p``."""
+
+    code: str  # of the reason, for programs
+    modes: Tuple[Mode, ...]
+    to: Mode
+    words: str  # the condition, for people
+    when: Condition
+    reason: str
+
+
+def pilot_has_control(i: ModeInputs, p: ModeParameters) -> bool:
+    """Return whether the RC is away from F, off, or not heard of."""
+    return i.rc is not RcMode.F or i.rc_age > p.rc_timeout
+
+
+def asked(request: Request) -> Condition:
+    """Return the condition that the operator asked for it."""
+    return lambda i, p: i.request is request
+
+
+def start(condition: Condition) -> Condition:
+    """Return the condition of a start that nothing stands against."""
+    return lambda i, p: i.request is Request.START and not preflight(i, p) and condition(i, p)
+
+
+def recovered(i: ModeInputs, p: ModeParameters) -> bool:
+    """Return whether braking may end."""
+    waited = i.time_in_mode >= p.brake_dwell and i.usable_time >= p.recover_time
+    return waited and i.plan_usable and i.authority and not i.alarm
+
+
+def airborne(i: ModeInputs, p: ModeParameters) -> bool:
+    """Return whether the take-off has done its work."""
+    return i.in_air and i.settled_time >= p.take_off_settle and i.authority
+
+
+def on_ground_again(i: ModeInputs, p: ModeParameters) -> bool:
+    """Return whether the flight controller says that it does not fly."""
+    return i.flight_status in (FlightStatus.ON_GROUND, FlightStatus.LANDED)
+
+
+def battery_is_low(i: ModeInputs, p: ModeParameters) -> bool:
+    """Return whether the configured action is due."""
+    return i.battery_low_time > p.battery_time
+
+
+def battery_ends_the_flight(i: ModeInputs, p: ModeParameters) -> bool:
+    """Return whether the battery demands a landing here."""
+    returned = i.is_home or i.battery_low_time > p.battery_time + p.return_timeout
+    lands = p.battery_action == "land" or (p.battery_action == "return" and returned)
+    return i.battery_critical_time > p.battery_time or (battery_is_low(i, p) and lands)
