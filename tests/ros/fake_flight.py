@@ -76,7 +76,7 @@ def main() -> None:
         header,
         [
             Obstacle(
-                o.id, SHAPES[o.shape], list(o.size), Point(*o.position), Vector3(), [], 0.0, 0.0
+                id=o.id, shape=SHAPES[o.shape], size=list(o.size), position=Point(*o.position)
             )
             for o in scenario.obstacles
         ],
