@@ -75,9 +75,7 @@ def main() -> None:
     obstacles.publish(
         header,
         [
-            Obstacle(
-                id=o.id, shape=SHAPES[o.shape], size=list(o.size), position=Point(*o.position)
-            )
+            Obstacle(id=o.id, shape=SHAPES[o.shape], size=list(o.size), position=Point(*o.position))
             for o in scenario.obstacles
         ],
     )

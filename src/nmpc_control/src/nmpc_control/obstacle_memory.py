@@ -11,7 +11,7 @@ which the guard answers by braking, until something new is heard or the sender i
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import Dict, Iterable, List, NamedTuple, Sequence, Set, Tuple
+from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_params import ObstacleParameters
@@ -72,8 +72,10 @@ class ObstacleMemory:
         self._known = {o.id: o for o in still[-MAX_OBSTACLES:]}
         self._due = -math.inf
 
-    def hear(self, t: float, sender: str, judged: Iterable[Tuple[Sighting, str]]) -> None:
-        """Take a sender's new list.
+    def hear(
+        self, t: float, sender: str, judged: Iterable[Tuple[Sighting, str]]
+    ) -> List[Tuple[str, str]]:
+        """Take a sender's new list; return ids of entries that were not believed, and why not.
 
         Args:
             t: [s] now.
@@ -83,30 +85,34 @@ class ObstacleMemory:
         before = self._tracks.get(sender, {})
         room = MAX_OBSTACLES - len(self._known) - sum(map(len, self._tracks.values()))
         after: Dict[str, _Track] = {}
-        kept: List[str] = []
+        refused: List[Tuple[str, str]] = []
         for sighting, found in judged:
             old = before.get(sighting.id)
             if not found and sighting.id in after:
                 found = DUPLICATE
             if not found and sighting.moves:
-                sighting, found = self._in_time(t, sighting, old)
+                if sighting.stamp > t + self.params.future_tolerance:
+                    refused.append((sighting.id, FUTURE))  # a wrong clock hides no obstacle
+                    sighting = sighting._replace(stamp=t)
+                found = self._out_of_time(t, sighting, old)
             elif not found:
                 sighting = sighting._replace(stamp=0.0)  # which says nothing about one that stands
             if not found and old is None:
                 room -= 1
                 found = NO_ROOM if room < 0 else ""
             if found:
-                self.rejected[found] += 1
-                kept.append(sighting.id)
+                refused.append((sighting.id, found))
             elif old is not None and old.sighting == sighting:
                 after[sighting.id] = old
             else:
                 after[sighting.id] = self._track(sender, sighting)
-        for name in kept:
+        for name, found in refused:
+            self.rejected[found] += 1
             if name in before:
                 after.setdefault(name, before[name])
         self.heard = t
         self._replace(t, sender, before, after)
+        return refused
 
     def reject(self, kind: str, count: int = 1) -> None:
         """Count what could not even be read; the knowledge about its sender's obstacles ages."""
@@ -157,16 +163,12 @@ class ObstacleMemory:
         known, oldest = len(self.obstacles(t)), t - min(stamps, default=t)
         return Summary(known, len(stamps), oldest, tuple(self._tracks), dict(self.rejected))
 
-    def _in_time(self, t: float, s: Sighting, old: "_Track") -> Tuple[Sighting, str]:
-        """Return a moving entry with the time it counts from, and what is wrong with its time."""
-        if s.stamp > t + self.params.future_tolerance:
-            self.rejected[FUTURE] += 1  # of the stamp only: a wrong clock hides no obstacle
-            s = s._replace(stamp=t)
-        if t - s.stamp > self.params.stale_after and (old is None or s.stamp != old.sighting.stamp):
-            return s, PAST
-        if old is not None and old.moves and s.stamp < old.sighting.stamp:
-            return s, BACKWARDS
-        return s, ""
+    def _out_of_time(self, t: float, s: Sighting, old: Optional[_Track]) -> str:
+        """Return what is wrong with the time of a moving entry; news said again is only old."""
+        last = old.sighting.stamp if old is not None and old.moves else -math.inf
+        if t - s.stamp > self.params.stale_after and s.stamp != last:
+            return PAST
+        return BACKWARDS if s.stamp < last else ""
 
     def _track(self, sender: str, sighting: Sighting) -> _Track:
         owner = self._owner.setdefault(sighting.id, sender)

@@ -6,10 +6,12 @@ ROS Publishers:
     dji_sdk/flight_control_setpoint_generic (sensor_msgs/Joy): 50 Hz while automatic flight is on.
     nmpc/hold_request (std_msgs/Empty): tells the controller to drop its goal.
     nmpc/status, /diagnostics: see ``guard_reports``.
-ROS Services: start, hover, land, release (std_srvs/Trigger), answered with a reason in words.
+ROS Services: start, hover, land, release (std_srvs/Trigger), answered with a reason in words;
+    those of ``obstacle_services``.
 ROS Parameters:
     ~vehicle (str): file under config/vehicles.
     ~avoidance (bool): false leaves obstacles out of the plan check.
+    ~frame_id (str): world frame, instead of the one in ``config/guard.yaml``.
 """
 
 import os
@@ -19,6 +21,7 @@ import sys
 import threading
 import time
 import traceback
+from dataclasses import replace
 from typing import Callable, Optional
 
 import rospy
@@ -35,6 +38,7 @@ from nmpc_control.params import load_parameters
 from nmpc_control.ros.dji_services import DjiServices
 from nmpc_control.ros.guard_listener import GuardListener
 from nmpc_control.ros.guard_reports import GuardReports
+from nmpc_control.ros.obstacle_services import ObstacleServices
 
 OVERSLEPT = 0.06  # [s] of wall time between two ticks: this process was not running
 CATCH_UP = 0.01  # [s] of wall time that callbacks then get
@@ -58,6 +62,8 @@ class GuardNode:
         self.guard = guard
         self._listener = GuardListener(guard.params, avoidance)
         self._reports = GuardReports(guard, self._listener.rejected_samples)
+        self._reports.add("obstacles", self._listener.obstacles.diagnose)
+        self._obstacle_services = ObstacleServices(self._listener.obstacles)
         self._dji = DjiServices(self._listener.set_authority, self._listener.report_failure)
         self._questions: "queue.Queue[_Question]" = queue.Queue(maxsize=10)
         self._is_leaving = False
@@ -128,7 +134,7 @@ class GuardNode:
             question.answer = output.answer or (False, output.reason)
             question.answered.set()
             rospy.loginfo(f"{question.request.value}: {question.answer[1]}")
-        obstacle_age = self._listener.obstacle_age(t)
+        obstacle_age = self._listener.obstacles.age(t)
         self._reports.publish(now, inputs, output, self._listener.last_plan, obstacle_age)
 
     def _act(self, output: GuardOutput) -> None:
@@ -183,6 +189,7 @@ def main() -> None:
 
 def _guard() -> Guard:
     params = load_guard_parameters()
+    params = replace(params, world_frame=rospy.get_param("~frame_id", params.world_frame))
     parameters = load_parameters(_vehicle_name())
     vehicle = parameters.vehicle
     if params.vertical_command == "thrust" and not vehicle.thrust_map.measured_on:
