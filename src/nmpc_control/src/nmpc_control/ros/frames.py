@@ -67,13 +67,13 @@ class Frames:
         numbers = np.array([r.x, r.y, r.z, q.x, q.y, q.z, q.w])
         if not np.isfinite(numbers).all() or abs(np.linalg.norm(numbers[3:]) - 1.0) > 0.05:
             raise FrameError(f"frame {frame!r}: its transform is not finite or not a rotation")
-        return _rotation(*(numbers[3:] / np.linalg.norm(numbers[3:]))), numbers[:3]
+        return rotation(*(numbers[3:] / np.linalg.norm(numbers[3:]))), numbers[:3]
 
     def _look_up(self, frame: str, stamp: rospy.Time) -> object:
         return self._buffer.lookup_transform(self.world, frame, stamp, rospy.Duration(0))
 
 
-def _rotation(x: float, y: float, z: float, w: float) -> np.ndarray:
+def rotation(x: float, y: float, z: float, w: float) -> np.ndarray:
     """Return the rotation matrix (3, 3) of a unit quaternion."""
     return np.array(
         [

@@ -3,7 +3,8 @@
 
 A message is judged by its size and count before anything of it is read, and of each sender only
 the newest is read, at most ``message_rate`` times a second, in a thread of its own: a flood must
-not starve the loop beside it. Senders are told apart by the name of their node.
+not starve the loop beside it. Senders are told apart by the name of their node. A list in a frame
+that is not known is tried again until its sender sends another one.
 
 ROS Subscribers: obstacles (nmpc_msgs/ObstacleArray), in any frame that tf2 knows; where asked for
 nmpc/known_obstacles (the same), those of the scenario, from nmpc_controller.
@@ -14,7 +15,7 @@ import threading
 import time
 import traceback
 from functools import partial
-from typing import Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -31,10 +32,18 @@ from nmpc_msgs.msg import ObstacleArray
 
 TOPIC, KNOWN_TOPIC = "obstacles", "nmpc/known_obstacles"
 MAX_BYTES = 500_000  # [1] of one message: the most obstacles with paths of 60 points have 420,000
+RETRY_PERIOD = 0.5  # [s] of wall time between two looks for a frame that is not known
 _IDLE = 0.005  # [s] of wall time between two looks at what waits for its turn
-_WARNING_PERIOD = 1.0  # [s] of wall time between warnings of one kind
+_WARNING_PERIOD = 2.0  # [s] of wall time between warnings of one kind
 
 Judged = List[Tuple[Sighting, str]]
+
+
+class _Unplaced(NamedTuple):
+    head: Head
+    data: bytes
+    retry: float  # [s] wall time
+    counted: bool
 
 
 class ObstaclePort:
@@ -49,6 +58,8 @@ class ObstaclePort:
         self._left_out = left_out
         self._waiting: Dict[Tuple[str, str], Tuple[Head, bytes]] = {}  # by topic and sender
         self._read: Dict[Tuple[str, str], float] = {}  # [s] when each was read last
+        self._unplaced: Dict[Tuple[str, str], _Unplaced] = {}  # used by one thread only
+        self._forgotten: Set[Tuple[str, str]] = set()  # whose late lists are not to come back
         self._wake = threading.Condition()  # of what waits
         self._warned: Dict[str, float] = {}  # [s] wall time by kind
         self._diagnosed = 0  # rejections that the last diagnosis knew
@@ -82,6 +93,7 @@ class ObstaclePort:
         """Forget all that a sender reported; return how many obstacles that were."""
         with self._wake:
             self._waiting.pop((TOPIC, sender), None)
+            self._forgotten.add((TOPIC, sender))
         with self._lock:
             return self._memory.forget(sender)
 
@@ -121,9 +133,6 @@ class ObstaclePort:
             kind = header.get("type", "a type that it does not name")
             self._reject("type", f"{sender} sends {kind}, or another version of it")
             return
-        if len(data) > MAX_BYTES:
-            self._reject("too large", f"{sender} sends {len(data)} bytes, {MAX_BYTES} are read")
-            return
         try:
             head = read_head(data)
         except WireError as error:
@@ -133,6 +142,9 @@ class ObstaclePort:
             words = f"{sender} sends {head.count} obstacles, at most {MAX_OBSTACLES} are taken"
             self._reject("too many", words)
             return
+        if len(data) > MAX_BYTES:
+            self._reject("too large", f"{sender} sends {len(data)} bytes, {MAX_BYTES} are read")
+            return
         with self._wake:
             self._waiting[topic, sender] = head, data
             self._wake.notify()
@@ -140,36 +152,47 @@ class ObstaclePort:
     def _work(self) -> None:
         while not rospy.is_shutdown():
             due = self._next()
-            for (topic, sender), (head, data) in due:
-                try:
-                    self._take(topic, sender, head, data)
-                except Exception:  # noqa: BLE001 (one odd message must not blind an aircraft)
-                    self._reject("unreadable", f"{sender}: {traceback.format_exc(limit=-2)}")
+            for key, (head, data) in due:
+                self._unplaced.pop(key, None)
+                self._try(key, head, data, counted=False)
+            now = time.monotonic()
+            for key, late in list(self._unplaced.items()):
+                if now >= late.retry:
+                    del self._unplaced[key]
+                    self._try(key, late.head, late.data, late.counted)
             if not due:
                 time.sleep(_IDLE)
+
+    def _try(self, key: Tuple[str, str], head: Head, data: bytes, counted: bool) -> None:
+        topic, sender = key
+        try:
+            self._take(topic, sender, head, data)
+        except WireError as error:
+            self._reject("unreadable", f"{sender}: {error}")
+        except FrameError as error:
+            if not (counted or self.frames.is_new):
+                self._reject("frame", f"{sender}: {error}")
+                counted = True
+            retry = time.monotonic() + RETRY_PERIOD
+            self._unplaced[key] = _Unplaced(head, data, retry, counted)
+        except Exception:  # noqa: BLE001 (one odd message must not blind an aircraft)
+            self._reject("unreadable", f"{sender}: {traceback.format_exc(limit=-2)}")
 
     def _next(self) -> List[Tuple[Tuple[str, str], Tuple[Head, bytes]]]:
         """Return what may be read now, after waiting for something to come."""
         with self._wake:
             if not self._waiting:
-                self._wake.wait(0.5)
+                self._wake.wait(RETRY_PERIOD)
             now, period = rospy.Time.now().to_sec(), 1.0 / self._params.message_rate
+            while self._forgotten:
+                self._unplaced.pop(self._forgotten.pop(), None)
             self._read = {k: t for k, t in self._read.items() if 0.0 <= now - t < period}
             due = [key for key in self._waiting if key not in self._read]
             self._read.update(dict.fromkeys(due, now))
             return [(key, self._waiting.pop(key)) for key in due]
 
     def _take(self, topic: str, sender: str, head: Head, data: bytes) -> None:
-        try:
-            judged = self.judge(head, read_obstacles(data, head))
-        except (WireError, FrameError) as error:
-            kind = "frame" if isinstance(error, FrameError) else "unreadable"
-            if kind != "frame" or not self.frames.is_new:
-                self._reject(kind, f"{sender}: {error}")
-                return
-            with self._wake:
-                self._waiting.setdefault((topic, sender), (head, data))  # until transforms came
-            return
+        judged = self.judge(head, read_obstacles(data, head))
         if topic == KNOWN_TOPIC:
             self.set_known([to_obstacle(s, s.id) for s, found in judged if not found])
             return
