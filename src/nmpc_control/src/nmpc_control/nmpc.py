@@ -2,21 +2,26 @@
 """The controller's optimiser: poses the problem of ``ocp``, keeps the warm start, returns plans."""
 
 from dataclasses import replace
-from typing import Optional, Sequence, Union
+from typing import Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from nmpc_control import constraints
 from nmpc_control.ipopt import IpoptSolver
+from nmpc_control.model import DISTURBANCE
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.ocp import Structure
+from nmpc_control.ocp import PARTS, Structure
 from nmpc_control.other_ways import OtherWays, Posed
 from nmpc_control.packing import check_arguments, pack_theta
 from nmpc_control.params import Parameters
 from nmpc_control.slots import Slots
 from nmpc_control.solution import Guess, Solution, shift
 from nmpc_control.sqp import SqpSolver
-from nmpc_control.state import GRAVITY, POSITION, Plan, hover_input
+from nmpc_control.state import GRAVITY, POSITION, VELOCITY, Plan, hover_input
+
+_SOON = 2.0  # [s] ahead in which a plan that goes on makes headway
+_NO_HEADWAY = 0.3  # [m], [m/s]
+_NAMED = 3  # obstacles in a sentence
 
 
 class Nmpc:
@@ -28,16 +33,16 @@ class Nmpc:
         self.structure = Structure(p.horizon, p.dt, p.integrator, p.obstacle_slots)
         budget = (p.budget.tolerance, p.budget.max_iterations, p.budget.time_budget)
         self.solver: Union[SqpSolver, IpoptSolver] = (
-            SqpSolver(self.structure, *budget)
+            SqpSolver(self.structure, *budget, p.budget.warm_iterations)
             if p.backend == "compiled"
             else IpoptSolver(self.structure, *budget, linear_solver=p.linear_solver)
         )
         self._last: Optional[Solution] = None
         self._last_t = 0.0
         self._slots = Slots(p.obstacle_slots)
-        self._other_ways = OtherWays(shooting=p.backend == "compiled")
+        self._other_ways = OtherWays(parameters.avoidance.guides, shooting=p.backend == "compiled")
+        self.held_up_by: Tuple[str, ...] = ()  # obstacles before which the last plan waits
         self.tracking_error = 0.0  # [m] by which plans have been missed lately; raises the margin
-        self._disturbance = np.zeros(3)
         self._theta = self._pack_theta(parameters)
 
     def use(self, parameters: Parameters) -> None:
@@ -51,6 +56,16 @@ class Nmpc:
         parameters = replace(parameters, solver=self.parameters.solver)
         self._theta = self._pack_theta(parameters)
         self.parameters = parameters
+
+    def expect(self, disturbance: np.ndarray, tracking_error: float = 0.0) -> None:
+        """Take what was learnt in flight into the problem.
+
+        Args:
+            disturbance: (3,) [m/s^2] constant acceleration in the world frame.
+            tracking_error: [m] by which plans are missed; added to the margin of Eq. 7.
+        """
+        self.tracking_error = tracking_error
+        self._theta[PARTS["model"]][DISTURBANCE] = disturbance
 
     def reset(self) -> None:
         """Forget the last solution: the next solve starts from hover."""
@@ -91,11 +106,13 @@ class Nmpc:
         if guess is not None and guess.multipliers is not None:
             guess.multipliers[:, [constraints.PILOT_BOUNDS + i for i in self._slots.renewed]] = 0.0
         solution = self.solver.solve(instance, guess)
-        if problem.obstacles and self.parameters.avoidance.guides:
+        self.held_up_by = ()
+        if problem.obstacles:
             choice = self._other_ways.improve(
                 self.solver, problem, solution, self._slots, warm=guess is not None
             )
             solution, self._slots = choice.solution, choice.slots
+            self.held_up_by = self._holding(problem, solution, choice.blocked)
         self._last, self._last_t = (solution, t) if solution.found else (None, 0.0)
         return self.as_plan(t, solution, self._remark(solution, problem))
 
@@ -152,12 +169,14 @@ class Nmpc:
         )
 
     def _pack_theta(self, p: Parameters) -> np.ndarray:
-        return pack_theta(p.vehicle, p.weights, p.limits, p.avoidance, self._disturbance)
+        return pack_theta(p.vehicle, p.weights, p.limits, p.avoidance)
 
     def _remark(self, solution: Solution, problem: Posed) -> str:
         """Return which softened bound the plan exceeds, or into which margin it begins; or ""."""
         if solution.softened:
             return f", {solution.softened} exceeded by {solution.violation:.2f}"
+        if self.held_up_by:
+            return f", held up by {', '.join(self.held_up_by)}"
         if self._slots.left_out:
             return f", {self._slots.left_out} obstacles in reach have no slot"
         now = self._slots.field.distances(problem.x0[None, POSITION], problem.times[:1])
@@ -165,6 +184,19 @@ class Nmpc:
         if inside > 0.0 and problem.obstacles:
             return f", obstacle margin entered by {inside:.2f}"
         return ""
+
+    def _holding(self, problem: Posed, solution: Solution, blocked: np.ndarray) -> Tuple[str, ...]:
+        """Return the ids of the obstacles before which a plan waits, nearest first, or ()."""
+        soon = min(int(_SOON / self.structure.dt), self.structure.horizon)
+        here = problem.x0[POSITION]
+        moves = np.linalg.norm(solution.states[soon, POSITION] - here) > _NO_HEADWAY
+        moves |= np.linalg.norm(problem.x0[VELOCITY]) > _NO_HEADWAY
+        arrived = np.linalg.norm(problem.x_ref[-1, POSITION] - here) < _NO_HEADWAY
+        if moves or arrived or not blocked.any():
+            return ()
+        distances = self._slots.field.distances(here[None], problem.times[:1])[:, 0]
+        nearest = np.argsort(np.where(blocked, distances, np.inf), kind="stable")
+        return tuple(self._slots.field.ids[i] for i in nearest[: min(_NAMED, blocked.sum())])
 
     def _guess(self, t: float) -> Optional[Guess]:
         if self._last is None:

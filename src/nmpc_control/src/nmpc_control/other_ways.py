@@ -19,7 +19,6 @@ from nmpc_control.slots import Slots
 from nmpc_control.solution import Guess, Solution
 from nmpc_control.state import NU, NX, POSITION, VELOCITY
 
-_TRIES = 1  # sides tried in one tick beside a solution
 _BETTER = 0.95  # of its cost: what is dearer than this is no reason to change
 _SIDEWAYS = 1.5  # [m/s] of a way away from the reference
 
@@ -69,8 +68,14 @@ class Posed:
 class OtherWays:
     """Tries sides in turn, and counts how often one was better."""
 
-    def __init__(self, shooting: bool) -> None:
-        """Begin; ``shooting``: whether the solver takes a guess by its inputs."""
+    def __init__(self, tries: int, shooting: bool) -> None:
+        """Begin.
+
+        Args:
+            tries: sides tried in one tick beside the last tick's; none: no side ever is.
+            shooting: whether the solver takes a guess by its inputs.
+        """
+        self._tries = tries
         self.changes = 0
         self._turns = Turns()
         self._shooting = shooting
@@ -90,11 +95,11 @@ class OtherWays:
         reference = eased(problem.x_ref[:, POSITION], problem.x0[POSITION], problem.times)
         spheres = slots.field.spheres(reference, problem.times)
         best = Choice(solution, slots, blocked=conflicts(spheres, problem.margin, reference))
-        if not best.blocked.any():
+        if not (best.blocked.any() and self._tries):
             return best
         across = sides(reference[-1] - reference[0])
         slope = _SIDEWAYS * problem.structure.dt
-        for index in self._turns.take(_TRIES if warm and solution.found else SIDES):
+        for index in self._turns.take(self._tries if warm and solution.found else SIDES):
             way = way_round(spheres, problem.margin, reference, across[index], slope)
             if way is None:
                 continue

@@ -17,7 +17,6 @@ def pack_theta(
     weights: Weights,
     limits: Limits,
     avoidance: Avoidance,
-    disturbance: np.ndarray,
 ) -> np.ndarray:
     """Return the parameter vector (THETA_SIZE,) shared by all stages.
 
@@ -31,7 +30,7 @@ def pack_theta(
     hard = avoidance.enabled and avoidance.term != "potential"
     theta = np.concatenate(
         [
-            model_parameters(vehicle, disturbance),
+            model_parameters(vehicle),
             weights.Q,
             weights.Q_f,
             weights.R,
@@ -75,6 +74,7 @@ def _check_numbers(
         ("fence_min", limits.fence_min, 3),
         ("fence_max", limits.fence_max, 3),
         ("drag", vehicle.drag, 3),
+        ("disturbance", vehicle.disturbance, 3),
     ):
         if np.shape(vector) != (length,):
             raise ProblemError(f"{name}: got shape {np.shape(vector)}, expected {(length,)}")
