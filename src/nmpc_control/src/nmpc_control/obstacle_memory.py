@@ -36,11 +36,11 @@ class Summary(NamedTuple):
     rejected: Dict[str, int]  # [1] entries by kind
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Track:
     sighting: Sighting
     obstacle: Obstacle
-    aged: Obstacle  # the same, once its information is older than the age limit
+    is_aged: bool = False  # whether it grows as one of whom nothing is heard
 
     @property
     def moves(self) -> bool:
@@ -172,16 +172,10 @@ class ObstacleMemory:
 
     def _track(self, sender: str, sighting: Sighting) -> _Track:
         owner = self._owner.setdefault(sighting.id, sender)
-        obstacle = to_obstacle(
-            sighting, sighting.id if owner == sender else f"{sighting.id}@{sender}"
-        )
-        aged = obstacle
-        if sighting.moves:
-            growth = max(sighting.growth, self.params.default_growth)
-            aged = replace(obstacle, growth=growth)
-            if sighting.id in self._known:
-                self._gone_from_start.add(sighting.id)
-        return _Track(sighting, obstacle, aged)
+        name = sighting.id if owner == sender else f"{sighting.id}@{sender}"
+        if sighting.moves and sighting.id in self._known:
+            self._gone_from_start.add(sighting.id)
+        return _Track(sighting, to_obstacle(sighting, name))
 
     def _replace(
         self, t: float, sender: str, before: Dict[str, _Track], after: Dict[str, _Track]
@@ -209,4 +203,8 @@ class ObstacleMemory:
                 yield obstacle
         for tracks in self._tracks.values():
             for track in tracks.values():
-                yield track.aged if track.moves and t >= self._limit(track) else track.obstacle
+                if track.moves and not track.is_aged and t >= self._limit(track):
+                    growth = max(track.sighting.growth, self.params.default_growth)
+                    track.obstacle = replace(track.obstacle, growth=growth)
+                    track.is_aged = True
+                yield track.obstacle

@@ -116,7 +116,7 @@ class ControllerNode:
             self.controller.record_input(sent, None if u is None else np.array(u))
         while not self._requests.empty():
             self._requests.get_nowait()(t)
-        self.controller.obstacles = self._port.obstacles(t)
+        self.controller.obstacles, _ = self._port.look(t)
         self.publishers.obstacles(t, self.controller.obstacles)
         pursued = self.controller.itinerary.goal is not Goal.HOLD
         clock_start = self.controller.itinerary.clock_start

@@ -58,8 +58,7 @@ class GuardListener:
         """Return what a tick at ``t`` [s] sees, with the operator's request."""
         with self._lock:
             if self.avoidance:
-                self._inbox.obstacles = self.obstacles.obstacles(t)
-                self._inbox.obstacles_stale = self.obstacles.stale(t)
+                self._inbox.obstacles, self._inbox.obstacles_stale = self.obstacles.look(t)
             self._inbox.request = request
             return self._inbox.inputs(t)
 

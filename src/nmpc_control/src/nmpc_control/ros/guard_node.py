@@ -45,6 +45,7 @@ CATCH_UP = 0.01  # [s] of wall time that callbacks then get
 CLOCK_STEP = 0.1  # [s] by which the clock may step back without being a jump
 HEAR_AGAIN = 0.1  # [s] of wall time for telemetry after a jump
 ANSWER_TIMEOUT = 2.0  # [s] wall time in which a tick must answer a service call
+SWITCH_INTERVAL = 5e-4  # [s] for which a thread that reads messages may keep the loop waiting
 NICENESS = -10  # ahead of solver, recorder and desktop, where the system allows it
 
 
@@ -176,6 +177,7 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     _ask_for_priority()
+    sys.setswitchinterval(SWITCH_INTERVAL)
     try:
         guard = _guard()
         GuardNode(guard, bool(rospy.get_param("~avoidance", True))).run()

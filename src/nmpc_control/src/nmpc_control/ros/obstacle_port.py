@@ -55,6 +55,7 @@ class ObstaclePort:
         self._params = load_obstacle_parameters()
         self._memory = ObstacleMemory(self._params)
         self._lock = threading.Lock()  # of the memory
+        self._seen: Tuple[Tuple[Obstacle, ...], str] = (), ""
         self._left_out = left_out
         self._waiting: Dict[Tuple[str, str], Tuple[Head, bytes]] = {}  # by topic and sender
         self._read: Dict[Tuple[str, str], float] = {}  # [s] when each was read last
@@ -75,15 +76,18 @@ class ObstaclePort:
         with self._lock:
             self._memory.set_known(obstacles)
 
-    def obstacles(self, t: float) -> Tuple[Obstacle, ...]:
-        """Return what is known at ``t`` [s]: the same tuple for as long as nothing changes."""
-        with self._lock:
-            return self._memory.obstacles(t)
+    def look(self, t: float) -> Tuple[Tuple[Obstacle, ...], str]:
+        """Return what is known at ``t`` [s], and of whom too little was heard; waits for nobody.
 
-    def stale(self, t: float) -> str:
-        """Return in one sentence of whom too little was heard at ``t`` [s]; empty if of nobody."""
-        with self._lock:
-            return self._memory.stale(t)
+        The obstacles are the same tuple for as long as nothing changes. While a list is being
+        taken in, they are those of the last look.
+        """
+        if self._lock.acquire(blocking=False):
+            try:
+                self._seen = self._memory.obstacles(t), self._memory.stale(t)
+            finally:
+                self._lock.release()
+        return self._seen
 
     def age(self, t: float) -> float:
         """Return the age [s] of the newest message that was taken; inf without."""
