@@ -14,6 +14,7 @@ ROS Parameters:
     ~frame_id (str): world frame, instead of the one in ``config/guard.yaml``.
 """
 
+import gc
 import os
 import queue
 import signal
@@ -180,7 +181,10 @@ def main() -> None:
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
         guard = _guard()
-        GuardNode(guard, bool(rospy.get_param("~avoidance", True))).run()
+        node = GuardNode(guard, bool(rospy.get_param("~avoidance", True)))
+        gc.collect()
+        gc.freeze()  # or now and then a tick would wait until all modules were looked through again
+        node.run()
     except NmpcError as error:
         sys.exit(_refuse(str(error), 2))
     except KeyboardInterrupt:
