@@ -6,8 +6,9 @@ the newest is read, at most ``message_rate`` times a second, in a thread of its 
 not starve the loop beside it. Senders are told apart by the name of their node. A list in a frame
 that is not known is tried again until its sender sends another one.
 
-ROS Subscribers: obstacles (nmpc_msgs/ObstacleArray), in any frame that tf2 knows; where asked for
-nmpc/known_obstacles (the same), those of the scenario, from nmpc_controller.
+ROS Subscribers: obstacles (nmpc_msgs/ObstacleArray), in any frame that tf2 knows; the same type
+nmpc/added_obstacles, from ``obstacle_services``; where asked for nmpc/known_obstacles, those of the
+scenario, from nmpc_controller.
 """
 
 import math
@@ -30,7 +31,7 @@ from nmpc_control.ros.obstacle_wire import Head, WireError, read_head, read_obst
 from nmpc_control.ros.subscriptions import Subscriptions
 from nmpc_msgs.msg import ObstacleArray
 
-TOPIC, KNOWN_TOPIC = "obstacles", "nmpc/known_obstacles"
+TOPIC, ADDED_TOPIC, KNOWN_TOPIC = "obstacles", "nmpc/added_obstacles", "nmpc/known_obstacles"
 MAX_BYTES = 500_000  # [1] of one message: the most obstacles with paths of 60 points have 420,000
 RETRY_PERIOD = 0.5  # [s] of wall time between two looks for a frame that is not known
 _IDLE = 0.005  # [s] of wall time between two looks at what waits for its turn
@@ -68,7 +69,7 @@ class ObstaclePort:
 
     def subscribe(self, subscriptions: Subscriptions, known: bool) -> None:
         """Begin to listen; ``known`` also to the obstacles of the controller's scenario."""
-        for topic in (TOPIC, KNOWN_TOPIC) if known else (TOPIC,):
+        for topic in (TOPIC, ADDED_TOPIC, *((KNOWN_TOPIC,) if known else ())):
             subscriptions.add(topic, rospy.AnyMsg, partial(self._on_message, topic))
 
     def set_known(self, obstacles: Sequence[Obstacle]) -> None:

@@ -5,7 +5,8 @@ Served by flight_guard, which lives as long as the flight: what was added is pub
 sender's list, latched, so that controller and guard read the same and neither waits for the other.
 
 ROS Services: add_obstacle (nmpc_msgs/AddObstacle), remove_obstacle (nmpc_msgs/RemoveObstacle).
-ROS Publishers: obstacles (nmpc_msgs/ObstacleArray), latched: what was added.
+ROS Publishers: nmpc/added_obstacles (nmpc_msgs/ObstacleArray), latched: what was added. Not on
+    ``obstacles``, where a connection to the own node would hide that there is none to a sensor.
     nmpc/forget_obstacles (std_msgs/String): name of a sender whose obstacles are to be forgotten.
 """
 
@@ -20,7 +21,7 @@ from nmpc_control.errors import NmpcError
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_sighting import MAX_OBSTACLES, to_obstacle
 from nmpc_control.ros.conversions import obstacles_to_msg
-from nmpc_control.ros.obstacle_port import ObstaclePort
+from nmpc_control.ros.obstacle_port import ADDED_TOPIC, ObstaclePort
 from nmpc_control.ros.obstacle_wire import read_head, read_obstacles
 from nmpc_msgs.msg import ObstacleArray
 from nmpc_msgs.srv import (
@@ -40,7 +41,7 @@ class ObstacleServices:
         self._port = port
         self._added: Dict[str, Obstacle] = {}
         self._lock = threading.Lock()
-        self._list = rospy.Publisher("obstacles", ObstacleArray, queue_size=1, latch=True)
+        self._list = rospy.Publisher(ADDED_TOPIC, ObstacleArray, queue_size=1, latch=True)
         self._forgotten = rospy.Publisher("nmpc/forget_obstacles", String, queue_size=10)
         self._publish()
         rospy.Service("add_obstacle", AddObstacle, self._add)
@@ -95,6 +96,8 @@ class ObstacleServices:
         if request.id:
             return False, "give `id` or `source`, not both"
         sender = request.source if request.source[0] == "/" else f"/{request.source}"
+        if sender == rospy.get_name():
+            return self._take_back("")
         self._forgotten.publish(sender)
         count = self._port.forget(sender)
         if not count:
