@@ -44,6 +44,7 @@ GUARD = [
         "estimator",
         "guard",
         "modes",
+        "obstacle_memory",
         "params",
         "plan_check",
         "plan_consistency",

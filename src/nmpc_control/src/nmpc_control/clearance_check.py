@@ -15,7 +15,7 @@ import numpy as np
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.params import Vehicle
-from nmpc_control.state import POSITION, Plan
+from nmpc_control.state import POSITION, VELOCITY, Plan
 from nmpc_control.verdict import NOT_INSIDE, Finding, Inside, PlanCheckParameters, Verdict
 
 SPACING = 0.05  # [m] of the points between two stages at which clearance is looked at
@@ -180,12 +180,17 @@ def _judged(
     now, nearest, last = way.clearance[:, 0], ahead.min(axis=1, initial=math.inf), ahead[:, -1]
     is_inside = now - way.growth < params.minimum_clearance
     inside = Inside({way.ids[i]: float(now[i]) for i in np.nonzero(is_inside)[0]})
+    speed = 0.0
+    if len(way.ids):
+        k = int(way.grown[:, : ahead.shape[1]].min(axis=0).argmin())
+        speed = float(np.linalg.norm(plan.state_at(way.times[k])[VELOCITY]))
     verdict = Verdict(
         Finding.OK,
         "the plan is verified",
         clearance=float(way.grown.min(initial=math.inf)),
         flown=plan,
         nearest=float((nearest - way.growth).min(initial=math.inf)),
+        speed=speed,
         inside=inside,
     )
     for i, (name, growth) in enumerate(zip(way.ids, way.growth)):

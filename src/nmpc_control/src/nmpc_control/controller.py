@@ -16,7 +16,7 @@ from nmpc_control.estimator import Estimator, StateEstimate
 from nmpc_control.itinerary import Itinerary
 from nmpc_control.nmpc import Nmpc
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.obstacle_field import ObstacleField
+from nmpc_control.obstacle_field import FieldOf
 from nmpc_control.params import Parameters, Vehicle
 from nmpc_control.prediction import predict
 from nmpc_control.solution import no_solution
@@ -60,8 +60,10 @@ class Controller:
         self.nmpc = Nmpc(parameters)
         self.obstacles: Sequence[Obstacle] = ()
         self.engaged = False  # the guard flies these plans
+        self.braking = False  # it does not, but brakes and will again
         self._inputs: Deque[Tuple[float, np.ndarray]] = deque()
         self._unknown = -np.inf  # [s] when an input was sent last that the model does not have
+        self._field_of = FieldOf()
         self._disturbance = DisturbanceEstimate(parameters.disturbance)
 
     def use(self, parameters: Parameters) -> None:
@@ -94,7 +96,9 @@ class Controller:
             return None
         x = estimate.vector
         if not self.engaged:
-            self.itinerary.hold(x[POSITION], x[YAW], "automatic flight ended")
+            self._stand_by(x)
+        else:
+            self.itinerary.resume(t)
         self.itinerary.update(t, x[POSITION], x[VELOCITY], bool(self.nmpc.held_up_by))
 
         vehicle = self._learn(t, x)
@@ -112,6 +116,13 @@ class Controller:
             clearance=self._clearance(x[None, POSITION], np.array([t])),
             predicted_clearance=self._clearance(plan.states[:, POSITION], times),
         )
+
+    def _stand_by(self, x: np.ndarray) -> None:
+        """Plan for where the aircraft is; a goal outlasts the guard's braking, nothing else."""
+        if self.braking:
+            self.itinerary.suspend(x[POSITION], x[YAW])
+        else:
+            self.itinerary.hold(x[POSITION], x[YAW], "automatic flight ended")
 
     def _learn(self, t: float, x: np.ndarray) -> Vehicle:
         """Return the model with what it was found to lack, also told to the optimiser."""
@@ -150,5 +161,5 @@ class Controller:
 
     def _clearance(self, positions: np.ndarray, times: np.ndarray) -> float:
         """Return the least distance [m] from hull to surface for positions (M, 3) at times (M,)."""
-        distances = ObstacleField(self.obstacles).distances(positions, times)
+        distances = self._field_of(self.obstacles).distances(positions, times)
         return float(distances.min(initial=np.inf)) - self.parameters.vehicle.radius

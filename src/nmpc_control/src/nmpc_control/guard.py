@@ -23,8 +23,7 @@ from nmpc_control.mode_inputs import (
     Request,
     preflight,
 )
-from nmpc_control.obstacle import Obstacle
-from nmpc_control.obstacle_field import ObstacleField
+from nmpc_control.obstacle_field import FieldOf, ObstacleField
 from nmpc_control.override import Override
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.sent_inputs import SentInputs
@@ -55,14 +54,9 @@ class Guard:
         self.ladder = PlanLadder(params.plan_check, params.hold_timeout, vehicle, limits)
         self._brake = Brake(vehicle, limits, params.brake)
         self.override = Override(
-            params.stopping,
-            params.brake,
-            vehicle,
-            1.0 / params.rate,
-            params.plan_check.clearance_horizon,
+            params.stopping, params.brake, vehicle, 1.0 / params.rate, params.plan_check
         )
-        self._obstacles = ObstacleField(())
-        self._converted: Sequence[Obstacle] = ()
+        self._field_of = FieldOf()
         self._disturbance = DisturbanceEstimate(params.disturbance)
         self._reason = ""
         self._failures = 0
@@ -73,7 +67,7 @@ class Guard:
         if i.t < self._t:
             self._forget(i.t)
         dt, self._t = min(max(i.t - self._t, 0.0), MAX_TICK), i.t
-        obstacles = self._as_field(i.obstacles)
+        obstacles = self._field_of(i.obstacles)
         self._learn(i)
 
         def brake_clearance() -> float:
@@ -141,12 +135,6 @@ class Guard:
         push = vehicle.disturbance + estimate.acceleration
         self._sent.vehicle = self.ladder.vehicle = replace(vehicle, disturbance=push)
 
-    def _as_field(self, obstacles: Sequence[Obstacle]) -> ObstacleField:
-        """Return obstacles as arrays, made once for each tuple of them."""
-        if obstacles is not self._converted or not isinstance(obstacles, tuple):
-            self._obstacles, self._converted = ObstacleField(obstacles), obstacles
-        return self._obstacles
-
     def _take_plan(
         self, i: GuardInputs, obstacles: ObstacleField, brake_clearance: Callable[[], float]
     ) -> None:
@@ -171,10 +159,8 @@ class Guard:
             return ""
         was_active = self.override.active
         state = None if i.estimate is None else self._state_in_effect(i)
-        age = max(0.0, self.ladder.age(i.t))
-        reason = self.override.reason(
-            i.t, i.obstacles_stale, state, obstacles, age, verdict.nearest
-        )
+        plan = self.ladder.flown
+        reason = self.override.reason(i.t, i.obstacles_stale, state, obstacles, plan, verdict)
         if reason and not was_active:
             self._brake.begin(self._sent.last(i.t, i.estimate))
         return reason
@@ -195,11 +181,13 @@ class Guard:
         elif self._settled_since is None:
             self._settled_since = i.t
         blind = telemetry.position_age > p.modes.position_timeout and not self._gps_holds(telemetry)
+        # while it is held back for obstacles long unseen, what they may have grown to is no news
+        is_held = bool(i.obstacles_stale) and self.mode in PLANNED and self.ladder.is_blocked(i.t)
         return replace(
             telemetry,
             needs_gps=p.position_source == "gps",
             verified_plans=self.ladder.verified,
-            plan_usable=rung is not Rung.NONE and is_fresh,
+            plan_usable=(rung is not Rung.NONE or is_held) and is_fresh,
             plan_finding="" if verdict.ok else verdict.sentence,
             usable_time=self.ladder.usable_time(i.t) if is_fresh else 0.0,
             goal=self.ladder.goal,

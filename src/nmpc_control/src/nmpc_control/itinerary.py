@@ -35,14 +35,27 @@ class Itinerary:
         self._hold: Tuple[np.ndarray, float] = (np.zeros(3), 0.0)
         self._leg: Optional[Trajectory] = None
         self._clock: Optional[ReferenceClock] = None
+        self._suspended: Optional[Goal] = None
         self._held_since: Optional[float] = None
         self._settled_since: Optional[float] = None
 
     def hold(self, position: np.ndarray, yaw: float, message: str = "told to hold") -> None:
         """Hold a position (3,) [m] and yaw [rad]; a goal that was pursued ends without arrival."""
-        if self.goal is not Goal.HOLD:
+        if self.goal is not Goal.HOLD or self._suspended is not None:
             self._end(False, message)
         self._hold = (np.array(position, dtype=float), float(yaw))
+
+    def suspend(self, position: np.ndarray, yaw: float) -> None:
+        """Hold a position (3,) [m] and yaw [rad] for a while; the goal and its clock wait."""
+        if self.goal is not Goal.HOLD:
+            self._suspended, self.goal = self.goal, Goal.HOLD
+        self._hold = (np.array(position, dtype=float), float(yaw))
+
+    def resume(self, t: float) -> None:
+        """Go on at ``t`` [s] with the goal where it was suspended, if one was."""
+        if self._suspended is not None:
+            self.goal, self._suspended = self._suspended, None
+            self._clock.resume(t)
 
     def go_to(
         self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float
@@ -59,7 +72,7 @@ class Itinerary:
 
     def begin(self, t: float, trajectory: Trajectory) -> None:
         """Start the trajectory's clock at ``t`` [s] wherever the aircraft is."""
-        self.goal, self.outcome = Goal.TRAJECTORY, None
+        self.goal, self.outcome, self._suspended = Goal.TRAJECTORY, None, None
         self.trajectory, self.clock_start = trajectory, t
         self._clock = ReferenceClock(trajectory, t, self.flight)
 
@@ -131,12 +144,8 @@ class Itinerary:
     def _set_out(
         self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float
     ) -> None:
-        self.goal, self.outcome, self.clock_start, self._settled_since = (
-            Goal.APPROACH,
-            None,
-            None,
-            None,
-        )
+        self.goal, self.outcome, self._suspended = Goal.APPROACH, None, None
+        self.clock_start, self._settled_since = None, None
         self._leg = approach(
             position,
             target,
@@ -180,3 +189,4 @@ class Itinerary:
     def _end(self, arrived: bool, message: str) -> None:
         self.goal, self.outcome = Goal.HOLD, Outcome(arrived, message)
         self._leg, self._clock, self.clock_start, self._held_since = None, None, None, None
+        self._suspended = None

@@ -54,11 +54,13 @@ class PlanLadder:
     def forget(self) -> None:
         """Drop everything that carries a time; the counts remain."""
         self.plan: Optional[Plan] = None
-        self._flown: Optional[Plan] = None  # with the states to which its inputs really lead
+        self.flown: Optional[Plan] = None  # with the states to which its inputs really lead
         self.goal = Goal.HOLD
         self.verified = 0  # [1] in a row
         self._verdict = Verdict(Finding.NOT_FOUND, "no plan has come")
         self._inside = NOT_INSIDE
+        self._came = -math.inf  # [s] the newest plan, verified or not
+        self._evades = False  # on a plan that is too near, because braking is worse
         self._is_new = False
         self._usable_since: Optional[float] = None
         self._hold_since: Optional[float] = None
@@ -89,6 +91,7 @@ class PlanLadder:
             brake_clearance: how near [m] a brake begun now comes to an obstacle.
         """
         self.received += 1
+        self._came = t
         if state is None:
             self._verdict = Verdict(Finding.JUMP, "the state is not known")
         else:
@@ -103,7 +106,7 @@ class PlanLadder:
                 params=self.params,
                 before=self._inside,
             )
-            self._verdict = _lesser_evil(self._verdict, brake_clearance)
+            self._verdict = self._lesser_evil(self._verdict, brake_clearance)
         if self._verdict.inside is not None:
             self._inside = self._verdict.inside.since(self._inside)
         if not self._verdict.ok:
@@ -111,7 +114,7 @@ class PlanLadder:
             self.verified = 0
             return
         self.plan, self.goal, self._is_new = plan, goal, True
-        self._flown = self._verdict.flown or plan
+        self.flown = self._verdict.flown or plan
         self.verified += 1
         if goal is Goal.HOLD:
             self._hold_since = None
@@ -149,6 +152,10 @@ class PlanLadder:
         self._is_new = False
         return rung, verdict
 
+    def is_blocked(self, t: float) -> bool:
+        """Return whether plans come, and the newest one was refused for obstacles alone."""
+        return self._verdict.is_near and t - self._came <= self.params.timeout
+
     def usable_time(self, t: float) -> float:
         """Return for how long [s] plans have been usable without interruption."""
         return 0.0 if self._usable_since is None else t - self._usable_since
@@ -167,14 +174,14 @@ class PlanLadder:
         else:
             rung = Rung.LAST_PLAN
             verdict = check_flown(
-                self._flown,
+                self.flown,
                 t=t,
                 vehicle=self.vehicle,
                 obstacles=obstacles,
                 params=self.params,
                 before=self._inside,
             )
-            verdict = _lesser_evil(verdict, brake_clearance)
+            verdict = self._lesser_evil(verdict, brake_clearance)
         if not verdict.ok:
             self.verified = 0
             return Rung.NONE, self._with_rejection(verdict)
@@ -188,15 +195,17 @@ class PlanLadder:
         if self._verdict.ok:
             return verdict
         sentence = f"{self._verdict.sentence}, and {verdict.sentence}"
-        return Verdict(self._verdict.finding, sentence, verdict.clearance)
+        return replace(verdict, finding=self._verdict.finding, sentence=sentence)
 
-
-def _lesser_evil(verdict: Verdict, brake_clearance: Callable[[], float]) -> Verdict:
-    """Return the verdict on a plan that is too near, seeing what braking would do instead."""
-    if not verdict.is_near or not math.isfinite(verdict.nearest):
-        return verdict
-    clearance = brake_clearance()
-    if verdict.nearest <= clearance + ADVANTAGE:
-        return verdict
-    sentence = f"{verdict.sentence}, but braking would come to {clearance:.2f} m"
-    return replace(verdict, finding=Finding.OK, sentence=sentence)
+    def _lesser_evil(self, verdict: Verdict, brake_clearance: Callable[[], float]) -> Verdict:
+        """Return the verdict on a plan that is too near, seeing what braking would do instead."""
+        if not verdict.is_near or not math.isfinite(verdict.nearest):
+            self._evades = False
+            return verdict
+        clearance = brake_clearance()
+        gain = verdict.nearest - clearance
+        self._evades = gain > (-ADVANTAGE if self._evades else ADVANTAGE)
+        if not self._evades:
+            return verdict
+        sentence = f"{verdict.sentence}, but braking would come to {clearance:.2f} m"
+        return replace(verdict, finding=Finding.OK, sentence=sentence)

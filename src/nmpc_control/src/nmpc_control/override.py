@@ -13,8 +13,12 @@ import numpy as np
 from nmpc_control.braking import BrakeParameters
 from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.params import Vehicle
-from nmpc_control.state import VELOCITY
+from nmpc_control.state import GRAVITY, VELOCITY, Plan
 from nmpc_control.stopping import StoppingParameters, clearance_of, shortfall, way_to_stop
+from nmpc_control.verdict import PlanCheckParameters, Verdict
+
+# [1] on the braking distance at full deceleration: what it takes on both plants, not at worst
+EXPECTED = 1.1
 
 
 class Override:
@@ -26,7 +30,7 @@ class Override:
         brake: BrakeParameters,
         vehicle: Vehicle,
         period: float,
-        horizon: float,
+        plan_check: PlanCheckParameters,
     ) -> None:
         """Begin without braking.
 
@@ -35,13 +39,14 @@ class Override:
             brake: the guard's own.
             vehicle: for hull and lags.
             period: [s] between two ticks.
-            horizon: [s] over which brake and plan are compared.
+            plan_check: for how long a plan is flown, and over which time it is judged.
         """
         self.params = params
         self.brake = brake
         self.vehicle = vehicle
         self.period = period
-        self.horizon = horizon
+        self.horizon = plan_check.clearance_horizon
+        self.plan_timeout = plan_check.timeout
         self.forget()
 
     def forget(self) -> None:
@@ -59,7 +64,9 @@ class Override:
             t: [s] of that.
             obstacles: as known now.
         """
-        way = way_to_stop(state, self.vehicle, self.brake, self.period, 1.0)
+        swing = math.atan(self.brake.deceleration / GRAVITY) / self.brake.tilt_rate
+        latency = self.period + swing / 2.0
+        way = way_to_stop(state, self.vehicle, self.brake, latency, EXPECTED)
         return clearance_of(way, self.horizon, t, obstacles, self.vehicle.radius)
 
     def reason(
@@ -68,8 +75,8 @@ class Override:
         stale: str,
         state: Optional[np.ndarray],
         obstacles: ObstacleField,
-        plan_age: float,
-        plan_clearance: float,
+        plan: Optional[Plan],
+        verdict: Verdict,
     ) -> str:
         """Return why to brake at ``t`` [s]; empty: the plan may be flown.
 
@@ -78,11 +85,11 @@ class Override:
             stale: why the obstacles are not known well enough; empty: they are.
             state: (10,) when a command sent now takes effect; None: unknown.
             obstacles: as known now.
-            plan_age: [s] of the plan that would be flown.
-            plan_clearance: [m] least that the plan keeps over the horizon.
+            plan: that would be flown, with the states to which it leads.
+            verdict: on this plan, now.
         """
         self.remark = ""
-        reason = stale or self._no_room(t, state, obstacles, plan_age, plan_clearance)
+        reason = stale or self._no_room(t, state, obstacles, plan, verdict)
         if reason and (stale or not self.active):
             self._until = t + self.params.dwell
         self._reason = reason or self._reason
@@ -94,23 +101,43 @@ class Override:
         t: float,
         state: Optional[np.ndarray],
         obstacles: ObstacleField,
-        plan_age: float,
-        plan_clearance: float,
+        plan: Optional[Plan],
+        verdict: Verdict,
     ) -> str:
         p = self.params
-        if not p.enabled or state is None or obstacles.unusable:
+        if not p.enabled or state is None or plan is None or obstacles.unusable:
             return ""
         if float(np.linalg.norm(state[VELOCITY])) < p.least_speed:
             return ""
-        way = way_to_stop(state, self.vehicle, self.brake, self.period + plan_age, p.factor)
+        age = max(0.0, t - plan.t)
+        way = way_to_stop(state, self.vehicle, self.brake, self.period + age, p.factor)
         in_effect, radius = t + self.vehicle.delay, self.vehicle.radius
         room = p.release if self.active else 0.0
         found = shortfall(way, in_effect, obstacles, radius, p.margin, room)
         if found is None:
             return ""
-        # a plan that leads past it is better than a brake that does not stop before it
-        gain = self.brake_clearance(state, in_effect, obstacles) - plan_clearance
-        if gain > (-p.advantage if self.active else p.advantage):
+        kept = self._kept(in_effect, age, plan, verdict, obstacles)
+        gain = self.brake_clearance(state, in_effect, obstacles) - kept
+        if self.active:
+            gain += 2.0 * p.advantage
+        if (kept < p.margin or self.active) and gain > p.advantage:
             return str(found)
-        self.remark = f"{found}; the plan keeps {plan_clearance:.2f} m"
+        self.remark = f"{found}; the plan keeps {kept:.2f} m"
         return ""
+
+    def _kept(
+        self, t: float, age: float, plan: Plan, verdict: Verdict, obstacles: ObstacleField
+    ) -> float:
+        """Return how far [m] from obstacles one stays who flies the plan.
+
+        One that has just come and leads past them at a good distance is taken at its word. Of any
+        other the guard must be able to make the best should no more plans come: it flies it until
+        it is too old, and then brakes.
+        """
+        p = self.params
+        leads_past = verdict.nearest >= p.evasion and verdict.speed >= p.least_speed
+        if leads_past and age <= p.evasion_age:
+            return verdict.nearest
+        later = t + max(0.0, self.plan_timeout - age)
+        after = self.brake_clearance(plan.state_at(later), later, obstacles)
+        return min(verdict.nearest, after)

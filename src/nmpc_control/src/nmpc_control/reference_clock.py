@@ -38,6 +38,10 @@ class ReferenceClock:
         """For how long [s] the trajectory's time has been over; negative before."""
         return self.time - self._trajectory.duration
 
+    def resume(self, t: float) -> None:
+        """Go on at ``t`` [s] where it was read last."""
+        self._t, self.rate = t, 0.0
+
     def read(self, times: np.ndarray) -> np.ndarray:
         """Return the trajectory's times [s] at times (M,) [s]."""
         return self.time + max(1.0, self.rate) * (times - self._t)

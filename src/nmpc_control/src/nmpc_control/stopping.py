@@ -40,6 +40,8 @@ class StoppingParameters:
     margin: float = _non_negative()  # [m] hull to surface left at the end
     least_speed: float = _positive()  # [m/s] slower is not looked at
     advantage: float = _non_negative()  # [m] by which braking must keep farther off than the plan
+    evasion: float = _non_negative()  # [m] a plan that leads past obstacles this far off is flown
+    evasion_age: float = _non_negative()  # [s] for as long as it is not older
     release: float = _non_negative()  # [m] more room than needed before plans are flown again
     dwell: float = _non_negative()  # [s] least time of braking
 

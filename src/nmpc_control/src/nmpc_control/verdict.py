@@ -78,6 +78,7 @@ class Verdict:
     clearance: float = math.inf  # [m] hull to the nearest surface over the rest of the plan
     flown: Optional[Plan] = None  # the plan with the states to which its inputs take this aircraft
     nearest: float = math.inf  # [m] as clearance, within the horizon that is judged
+    speed: float = 0.0  # [m/s] of the plan at that place
     inside: Optional[Inside] = None  # now; None where that was not looked at
 
     @property

@@ -237,6 +237,7 @@ class ControllerNode:
 
         def on_status(m: ControllerStatus) -> None:
             self.controller.engaged = m.mode in _ENGAGED
+            self.controller.braking = m.mode == ControllerStatus.MODE_BRAKING
             u = (m.applied.thrust, m.applied.roll, m.applied.pitch, m.applied.yaw_rate)
             known = m.setpoint_sent and np.all(np.isfinite(u))
             self._inputs.append((m.header.stamp.to_sec(), u if known else None))
