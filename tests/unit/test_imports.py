@@ -46,6 +46,7 @@ GUARD = [
         "guard",
         "modes",
         "override",
+        "obstacle_memory",
         "params",
         "plan_check",
         "plan_consistency",
