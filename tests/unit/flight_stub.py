@@ -23,7 +23,10 @@ from nmpc_control.prediction import step
 from nmpc_control.state import GRAVITY, NU, Goal, Plan, hover_input, hover_state
 
 TICK = 0.02  # [s]
-PARAMS = load_guard_parameters()
+_LOADED = load_guard_parameters()
+PARAMS = dataclasses.replace(  # the switch stands in F from the beginning
+    _LOADED, modes=dataclasses.replace(_LOADED.modes, needs_switch=False)
+)
 FLIGHT = load_parameters("dji_hil")
 VEHICLE, LIMITS = FLIGHT.vehicle, FLIGHT.limits
 

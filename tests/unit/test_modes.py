@@ -8,21 +8,23 @@ import math
 import pytest
 from flight_stub import GOOD, PARAMS
 
+from nmpc_control.config import config_directory
 from nmpc_control.dji import FlightStatus, RcMode
-from nmpc_control.mode_inputs import (
-    AUTOMATIC,
-    PLANNED,
-    STREAMING,
-    Mode,
-    Request,
-    preflight,
-)
-from nmpc_control.modes import RULES, answer, next_mode
+from nmpc_control.mode_inputs import AUTOMATIC, PLANNED, STREAMING, Mode, Request
+from nmpc_control.mode_rules import RULES
+from nmpc_control.modes import answer, next_mode
+from nmpc_control.modes_table import table
+from nmpc_control.preflight import preflight
 from nmpc_control.state import Goal
 
-P = PARAMS.modes
+P = dataclasses.replace(PARAMS.modes, needs_switch=True, battery_action="return")
 WARM = dataclasses.replace(
-    GOOD, verified_plans=P.warm_up_plans, plan_usable=True, usable_time=5.0, time_in_mode=5.0
+    GOOD,
+    verified_plans=P.warm_up_plans,
+    plan_usable=True,
+    usable_time=5.0,
+    time_in_mode=5.0,
+    switched_to_f=True,
 )
 ON_GROUND = {"flight_status": FlightStatus.ON_GROUND}
 IN_AIR = {"flight_status": FlightStatus.IN_AIR, "authority": True}
@@ -88,6 +90,24 @@ TABLE = [
         "goal",
     ),
     (Mode.HOVERING, {**IN_AIR, "battery": 0.1, "sticks": 1.0}, Mode.HOVERING, ""),
+    # watchdogs
+    (Mode.FLYING, {**IN_AIR, "alarm": "the speed is 15.0 m/s"}, Mode.BRAKING, "15.0 m/s"),
+    (Mode.HOVERING, {**IN_AIR, "tilt_time": 0.6}, Mode.RELEASED, "tilt"),
+    (Mode.HOVERING, {**IN_AIR, "tilt_time": 0.4}, Mode.HOVERING, ""),
+    (Mode.FLYING, {**IN_AIR, "effectless_time": 0.7}, Mode.BRAKING, "not followed"),
+    (Mode.BRAKING, {**IN_AIR, "effectless_time": 0.7}, Mode.HOVERING, "usable again"),
+    (Mode.BRAKING, {**IN_AIR, "effectless_total": 1.6}, Mode.RELEASED, "lost silently"),
+    (Mode.FLYING, {**IN_AIR, "effectless_total": 1.6}, Mode.RELEASED, "lost silently"),
+    (Mode.BRAKING, {**IN_AIR, "alarm": "the position"}, Mode.BRAKING, ""),
+    # battery
+    (Mode.FLYING, {**IN_AIR, "battery_low_time": 3.0}, Mode.HOVERING, "holds"),
+    (Mode.HOVERING, {**IN_AIR, "battery_low_time": 3.0}, Mode.HOVERING, ""),
+    (Mode.HOVERING, {**IN_AIR, "battery_low_time": 3.0, "is_home": True}, Mode.LANDING, "90%"),
+    (Mode.HOVERING, {**IN_AIR, "battery_low_time": 1.0, "is_home": True}, Mode.HOVERING, ""),
+    (Mode.FLYING, {**IN_AIR, "battery_low_time": 62.1}, Mode.LANDING, "90%"),
+    (Mode.BRAKING, {**IN_AIR, "battery_low_time": 62.1}, Mode.LANDING, "90%"),
+    (Mode.BRAKING, {**IN_AIR, "battery_low_time": 99.0, "time_in_mode": 0.5}, Mode.BRAKING, ""),
+    (Mode.HOVERING, {**IN_AIR, "battery_critical_time": 2.1}, Mode.LANDING, "90%"),
     # braking
     (Mode.BRAKING, IN_AIR, Mode.HOVERING, "usable again"),
     (Mode.BRAKING, {**IN_AIR, "goal": Goal.TRAJECTORY}, Mode.FLYING, "usable again"),
@@ -119,6 +139,7 @@ TABLE = [
     (Mode.MANUAL, {**IN_AIR, "request": Request.START}, Mode.WAITING, "new start"),
     (Mode.MANUAL, {**IN_AIR, "rc": RcMode.P}, Mode.MANUAL, ""),
     (Mode.MANUAL, {**IN_AIR, "rc_age": 0.4}, Mode.MANUAL, ""),
+    (Mode.MANUAL, {**ON_GROUND, "rc": RcMode.P}, Mode.WAITING, "landed"),
     (Mode.WAITING, {**IN_AIR, "rc": RcMode.P}, Mode.MANUAL, "RC P"),
     (Mode.READY, {**ON_GROUND, "rc": RcMode.P}, Mode.WAITING, ""),
 ]
@@ -139,6 +160,8 @@ def test_every_rule_is_met_by_the_table():
         fired |= {
             next((n for n, r in enumerate(RULES) if mode in r.modes and r.when(inputs, P)), None)
         }
+        transition = next_mode(mode, inputs, P)
+        assert bool(transition.code) == (transition.mode is not mode)
     silent = [RULES[n].reason for n in range(len(RULES)) if n not in fired]
     assert silent == [RULES[0].reason]  # the pilot: a test of its own below
 
@@ -216,6 +239,9 @@ PREFLIGHT = [
     ({"position_age": 0.3}, "position is 0.30 s old"),
     ({"rc_age": 0.4}, "RC is 0.40 s old"),
     ({"rc": RcMode.P}, "the RC switch is not in F but P"),
+    ({"switched_to_f": False}, "take it away and back"),
+    ({"position_age": math.inf}, "no local position reference yet"),
+    ({"objections": ("the position jumps",)}, "the position jumps"),
     ({"sticks": 0.11}, "sticks"),
     ({"sticks": math.nan}, "sticks"),
     ({"status_age": 0.6}, "flight status is 0.60 s old"),
@@ -242,6 +268,23 @@ def test_each_finding_before_the_flight_refuses_the_start_in_words(changes, sent
         assert not granted
         assert findings[0] in words
         assert next_mode(mode, inputs, P).mode not in AUTOMATIC
+
+
+@pytest.mark.parametrize("action", ["land", "hover"])
+def test_what_a_low_battery_does_is_configured(action):
+    low = dataclasses.replace(WARM, **IN_AIR, battery_low_time=3.0)
+    p = dataclasses.replace(P, battery_action=action)
+    expected = Mode.LANDING if action == "land" else Mode.HOVERING
+    assert next_mode(Mode.HOVERING, low, p).mode is expected
+    critical = dataclasses.replace(low, battery_critical_time=3.0)
+    assert next_mode(Mode.HOVERING, critical, p).mode is Mode.LANDING
+
+
+def test_the_document_is_what_is_flown():
+    document = config_directory().parent / "doc" / "modes.md"
+    assert document.read_text(encoding="utf-8") == table(), "run python -m nmpc_control.modes_table"
+    for rule in RULES:
+        assert rule.words in table()
 
 
 def test_gps_may_be_bad_where_the_position_comes_from_elsewhere():

@@ -61,6 +61,7 @@ class Controller:
         self.obstacles: Sequence[Obstacle] = ()
         self.engaged = False  # the guard flies these plans
         self.braking = False  # it does not, but brakes and will again
+        self.manual = False  # the pilot flies, or has just given back
         self._inputs: Deque[Tuple[float, np.ndarray]] = deque()
         self._unknown = -np.inf  # [s] when an input was sent last that the model does not have
         self._field_of = FieldOf()
@@ -96,8 +97,9 @@ class Controller:
             return None
         x = estimate.vector
         if not self.engaged:
-            self._stand_by(x)
+            self._stand_by(t, x)
         else:
+            self.itinerary.forget_in_time(t)
             self.itinerary.resume(t)
         self.itinerary.update(t, x[POSITION], x[VELOCITY], bool(self.nmpc.held_up_by))
 
@@ -117,10 +119,23 @@ class Controller:
             predicted_clearance=self._clearance(plan.states[:, POSITION], times),
         )
 
-    def _stand_by(self, x: np.ndarray) -> None:
-        """Plan for where the aircraft is; a goal outlasts the guard's braking, nothing else."""
+    def take_up(self, t: float) -> Tuple[bool, str]:
+        """Go on with the goal that the pilot interrupted; return whether, and a sentence."""
+        estimate = self.estimator.estimate(t)
+        if not self.itinerary.waits:
+            return False, "nothing waits to be resumed"
+        if not self.engaged or estimate is None:
+            return False, "automatic flight is off: call `start` first"
+        self.itinerary.take_up(t, estimate.vector[POSITION], float(estimate.vector[YAW]))
+        return True, "flying to where it was left"
+
+    def _stand_by(self, t: float, x: np.ndarray) -> None:
+        """Plan for where the aircraft is; a goal outlasts braking and the pilot, nothing else."""
         if self.braking:
             self.itinerary.suspend(x[POSITION], x[YAW])
+            self.itinerary.forget_in_time(t)
+        elif self.manual:
+            self.itinerary.leave_to_pilot(t, x[POSITION], float(x[YAW]))
         else:
             self.itinerary.hold(x[POSITION], x[YAW], "automatic flight ended")
 

@@ -2,54 +2,48 @@
 """The safety process without ROS: plan check, ladder, modes and the setpoint of one tick."""
 
 import math
-from dataclasses import dataclass, replace
-from typing import Callable, Optional, Sequence, Tuple
+from dataclasses import replace
+from typing import Callable, Optional, Tuple
 
 import numpy as np
 
-from nmpc_control import dji, modes
+from nmpc_control import modes
 from nmpc_control.braking import Brake
 from nmpc_control.disturbance_estimate import DisturbanceEstimate
-from nmpc_control.estimator import StateEstimate
+from nmpc_control.dji import FlightStatus
 from nmpc_control.guard_data import Action, GuardInputs, GuardOutput
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.ladder import PlanLadder, Rung
-from nmpc_control.mode_inputs import (
-    AUTOMATIC,
-    PLANNED,
-    STREAMING,
-    Mode,
-    ModeInputs,
-    Request,
-    preflight,
-)
+from nmpc_control.mode_conditions import battery_is_low, pilot_has_control
+from nmpc_control.mode_inputs import AUTOMATIC, PLANNED, STREAMING, Mode, ModeInputs, Request
 from nmpc_control.obstacle_field import FieldOf, ObstacleField
 from nmpc_control.override import Override
 from nmpc_control.params import Limits, Vehicle
+from nmpc_control.preflight import preflight
 from nmpc_control.sent_inputs import SentInputs
-from nmpc_control.state import THRUST, VELOCITY, hover_input
+from nmpc_control.setpoints import Command, Setpoints
+from nmpc_control.situation import Situation
+from nmpc_control.state import POSITION, VELOCITY, hover_input
 from nmpc_control.verdict import Verdict
 
 MAX_TICK = 0.1  # [s] a longer pause between ticks counts as this
 FORGOTTEN = 0.5  # [s] after its effect an input no longer shows in the attitude
 MAX_FAILURES = 10  # [1] ticks in a row that may raise before authority is released
-
-
-@dataclass(frozen=True)
-class _Command:
-    rung: Rung
-    axes: Optional[dji.Axes] = None
-    applied: Optional[Tuple[float, ...]] = None
+_SILENT_RUNGS = {Mode.RELEASED: Rung.RELEASE, Mode.LANDING: Rung.LANDING}
 
 
 class Guard:
     """Memory of one flight and ``tick``; asks for no time and knows no ROS."""
 
-    def __init__(self, params: GuardParameters, vehicle: Vehicle, limits: Limits) -> None:
-        """Begin waiting."""
+    def __init__(
+        self, params: GuardParameters, vehicle: Vehicle, limits: Limits, refusal: str = ""
+    ) -> None:
+        """Begin waiting; ``refusal`` says why this launch must never start, if so."""
         self.params = params
         self.vehicle = vehicle
         self.mode = Mode.WAITING
+        self.situation = Situation(params, vehicle, limits, refusal)
+        self._setpoints = Setpoints(params, vehicle)
         self._sent = SentInputs(vehicle)
         self.ladder = PlanLadder(params.plan_check, params.hold_timeout, vehicle, limits)
         self._brake = Brake(vehicle, limits, params.brake)
@@ -58,8 +52,11 @@ class Guard:
         )
         self._field_of = FieldOf()
         self._disturbance = DisturbanceEstimate(params.disturbance)
-        self._reason = ""
+        self._reason = self._code = ""
         self._failures = 0
+        self._axes = None  # the last that were sent, in the last tick
+        self._battery_told = False
+        self._reference_asked = -math.inf
         self._forget(-math.inf)
 
     def tick(self, i: GuardInputs) -> GuardOutput:
@@ -76,11 +73,13 @@ class Guard:
 
         self._take_plan(i, obstacles, brake_clearance)
         rung, verdict = self.ladder.assess(i.t, obstacles, brake_clearance)
-        seen = self._seen(i, rung, verdict)
+        self.situation.follow(i, dt, self.mode, self._axes, self._sent)
+        seen = self.situation.see(i, self.mode, rung, verdict, self.ladder)
         answer = modes.answer(self.mode, seen, self.params.modes) if seen.request else None
-        actions = self._change_mode(i, seen, answer)
+        actions = (*self._change_mode(i, seen, answer), *self._look_after_battery(i, seen))
         override = self._overridden(i, verdict, obstacles)
         command = self._command(i, seen, rung, dt, override)
+        self._axes = command.axes
         if command.axes is not None:
             self._sent.add(i.t, command.applied)
         self._sent.trim(i.t)
@@ -89,11 +88,13 @@ class Guard:
             mode=self.mode,
             rung=command.rung,
             reason=override or self._sentence(seen, verdict),
+            code="held_back" if override else self._code,
             axes=command.axes,
             applied=command.applied,
             actions=actions,
             answer=answer,
             clearance=verdict.clearance,
+            target=self._home(i) if Action.RETURN in actions else None,
         )
 
     def give_way(self, t: float, telemetry: ModeInputs, error: Exception) -> GuardOutput:
@@ -103,20 +104,20 @@ class Guard:
         pilot = pilot_has_control(telemetry, self.params.modes)
         if self._failures <= MAX_FAILURES:
             if self.mode not in STREAMING or pilot:
-                return GuardOutput(self.mode, Rung.NONE, reason)
-            trusted = self._gps_holds(telemetry)
-            axes = self._hold_axes() if trusted else self._axes(hover_input(), 0.0)[0]
-            return GuardOutput(Mode.BRAKING, Rung.BRAKE_BLIND, reason, axes)
+                return GuardOutput(self.mode, Rung.NONE, reason, "guard_failed")
+            if self.situation.gps_holds(telemetry):
+                command = self._setpoints.hold(Rung.BRAKE_BLIND)
+            else:
+                command = self._setpoints.of_input(Rung.BRAKE_BLIND, hover_input(), 0.0)
+            return GuardOutput(Mode.BRAKING, command.rung, reason, "guard_failed", command.axes)
         actions = (Action.RELEASE_AUTHORITY,) if self.mode in AUTOMATIC else ()
-        self._enter(Mode.FAULT, t, reason)
-        return GuardOutput(Mode.FAULT, Rung.RELEASE, reason, actions=actions)
+        self.mode, self._reason, self._code = Mode.FAULT, reason, "guard_failed"
+        return GuardOutput(Mode.FAULT, Rung.RELEASE, reason, self._code, actions=actions)
 
     def _forget(self, t: float) -> None:
         """Drop everything that carries a time, as when the clock went backwards."""
-        self._t = self._mode_since = t
-        self._reference_asked = -math.inf
-        self._settled_since: Optional[float] = None
-        self._last_good: Optional[StateEstimate] = None
+        self._t = t
+        self.situation.forget()
         self._sent.forget()
         self._disturbance.reset()
         self.ladder.forget()
@@ -164,49 +165,6 @@ class Guard:
             self._brake.begin(self._sent.last(i.t, i.estimate))
         return reason
 
-    def _seen(self, i: GuardInputs, rung: Rung, verdict: Verdict) -> ModeInputs:
-        """Return the telemetry with what the guard itself knows."""
-        p = self.params
-        telemetry = i.telemetry
-        is_fresh = (
-            telemetry.position_age <= p.modes.position_timeout
-            and telemetry.velocity_age <= p.modes.velocity_timeout
-        )
-        if is_fresh:
-            self._last_good = i.estimate
-        steady = i.estimate is not None and abs(i.estimate.vector[VELOCITY][2]) <= p.height_speed
-        if not (telemetry.in_air and steady and i.height >= p.modes.take_off_height):
-            self._settled_since = None
-        elif self._settled_since is None:
-            self._settled_since = i.t
-        blind = telemetry.position_age > p.modes.position_timeout and not self._gps_holds(telemetry)
-        # while it is held back for obstacles long unseen, what they may have grown to is no news
-        is_held = bool(i.obstacles_stale) and self.mode in PLANNED and self.ladder.is_blocked(i.t)
-        return replace(
-            telemetry,
-            needs_gps=p.position_source == "gps",
-            verified_plans=self.ladder.verified,
-            plan_usable=(rung is not Rung.NONE or is_held) and is_fresh,
-            plan_finding="" if verdict.ok else verdict.sentence,
-            usable_time=self.ladder.usable_time(i.t) if is_fresh else 0.0,
-            goal=self.ladder.goal,
-            settled_time=0.0 if self._settled_since is None else i.t - self._settled_since,
-            blind_time=telemetry.position_age if blind else 0.0,
-            brake_time_left=self._brake_time_left(i, telemetry),
-            time_in_mode=i.t - self._mode_since,
-        )
-
-    def _brake_time_left(self, i: GuardInputs, telemetry: ModeInputs) -> float:
-        """Return the time [s] that a brake on the last known velocity still needs."""
-        p = self.params
-        if telemetry.velocity_age <= p.modes.velocity_timeout or self._gps_holds(telemetry):
-            return math.inf
-        if self._last_good is None:
-            return 0.0
-        speed = float(np.linalg.norm(self._last_good.vector[VELOCITY][:2]))
-        needed = speed / p.brake.deceleration + self.vehicle.delay
-        return self._last_good.t + needed - i.t
-
     def _change_mode(
         self, i: GuardInputs, seen: ModeInputs, answer: Optional[Tuple[bool, str]]
     ) -> Tuple[Action, ...]:
@@ -219,7 +177,8 @@ class Guard:
             actions.append(Action.OBTAIN_AUTHORITY)
         if after is Mode.TAKING_OFF is not before:
             actions.append(Action.TAKE_OFF)
-        if after is Mode.LANDING is not before and request is Request.LAND:
+        lands_itself = seen.flight_status is FlightStatus.LANDING
+        if after is Mode.LANDING is not before and not lands_itself:
             actions += [Action.HOLD, Action.LAND]
         if after not in AUTOMATIC and (before in AUTOMATIC or request is Request.RELEASE):
             actions.append(Action.RELEASE_AUTHORITY)
@@ -231,70 +190,77 @@ class Guard:
         if after is not before:
             if after in (Mode.BRAKING, Mode.LANDING):
                 self._brake.begin(self._sent.last(i.t, i.estimate))
-            self._enter(after, i.t, transition.reason)
-        if self._wants_reference(i.t, seen):
-            self._reference_asked = i.t
+            self.situation.enter(after, before, i)
+            self.mode, self._reason, self._code = after, transition.reason, transition.code
+        if self._wants_reference(i.now, seen):
+            self._reference_asked = i.now
             actions.append(Action.SET_REFERENCE)
         return tuple(actions)
 
-    def _enter(self, mode: Mode, t: float, reason: str) -> None:
-        self.mode, self._mode_since, self._reason = mode, t, reason
+    def _look_after_battery(self, i: GuardInputs, seen: ModeInputs) -> Tuple[Action, ...]:
+        """Return what a low battery asks for, once in a flight; the landing is a change of mode."""
+        p = self.params.modes
+        if self.mode not in AUTOMATIC:
+            self._battery_told = False
+        if self.mode not in PLANNED or self._battery_told or not battery_is_low(seen, p):
+            return ()
+        self._battery_told = True
+        if p.battery_action == "return" and self._home(i) is not None:
+            return (Action.RETURN,)
+        self.ladder.expect_hold(i.t)
+        return (Action.HOLD,)
 
-    def _wants_reference(self, t: float, seen: ModeInputs) -> bool:
+    def _home(self, i: GuardInputs) -> Optional[Tuple[float, float, float]]:
+        """Return the point [m] above where automatic flight began, at the present height."""
+        if self.situation.home is None or i.estimate is None:
+            return None
+        east, north = self.situation.home[:2]
+        return float(east), float(north), float(i.estimate.vector[POSITION][2])
+
+    def _wants_reference(self, now: float, seen: ModeInputs) -> bool:
         """Return whether DJI's local position must be switched on: once, on the ground."""
         is_missing = seen.position_age > self.params.reference_retry
-        waited = t - self._reference_asked >= self.params.reference_retry
+        waited = now - self._reference_asked >= self.params.reference_retry
         on_ground = self.mode is Mode.WAITING and seen.on_ground and seen.needs_gps
-        return on_ground and is_missing and waited and self._gps_holds(seen)
-
-    def _gps_holds(self, telemetry: ModeInputs) -> bool:
-        """Return whether DJI's own velocity control can be trusted to hold."""
-        is_fresh = telemetry.gps_age <= self.params.modes.status_timeout
-        return is_fresh and telemetry.gps_health > dji.TRUSTED_GPS_HEALTH
+        return on_ground and is_missing and waited and self.situation.gps_holds(seen)
 
     def _command(
         self, i: GuardInputs, seen: ModeInputs, rung: Rung, dt: float, override: str
-    ) -> _Command:
+    ) -> Command:
         if self.mode in PLANNED and not override:
             plan = self.ladder.plan
             up = float(plan.state_at(i.t + plan.delay)[VELOCITY][2])
-            return _Command(rung, *self._axes(plan.input_at(i.t), up))
+            return self._setpoints.of_input(rung, plan.input_at(i.t), up)
         # until DJI's own landing has begun: silence while a service call blocks is nobody's control
         awaits_landing = self.mode is Mode.LANDING and seen.in_air
         if self.mode is not Mode.BRAKING and not awaits_landing and not override:
-            return _Command(Rung.RELEASE if self.mode is Mode.RELEASED else Rung.NONE)
+            return Command(_SILENT_RUNGS.get(self.mode, Rung.NONE))
         has_position = seen.position_age <= self.params.modes.position_timeout
         has_velocity = seen.velocity_age <= self.params.modes.velocity_timeout
         rung = Rung.BRAKE if has_position and has_velocity else Rung.BRAKE_BLIND
+        rung = Rung.LANDING if awaits_landing else rung
         if not seen.authority:
-            return _Command(rung)
-        if self._gps_holds(seen):
+            return Command(rung)
+        if self.situation.gps_holds(seen):
             self._brake.begin(hover_input())  # where a brake of our own would have to go on from
-            return _Command(rung, self._hold_axes())
+            return self._setpoints.hold(rung)
         state = self._state_in_effect(i)
         u = self._brake.input(state, dt, has_position and has_velocity)
-        return _Command(rung, *self._axes(u, 0.0))
+        return self._setpoints.of_input(rung, u, 0.0)
 
     def _state_in_effect(self, i: GuardInputs) -> np.ndarray:
         """Return the state (10,) expected when a command sent now takes effect."""
         has_velocity = i.telemetry.velocity_age <= self.params.modes.velocity_timeout
-        known = i.estimate if has_velocity and i.estimate is not None else self._last_good
+        known = i.estimate if has_velocity and i.estimate is not None else self.situation.last_good
         return self._sent.state_in_effect(i.t, known)
-
-    def _axes(self, u: Sequence[float], up: float) -> Tuple[dji.Axes, Tuple[float, ...]]:
-        """Return the axes for an input (4,) and the input that they really command."""
-        limits = self.params.setpoint_limits
-        if self.params.vertical_command == "velocity":
-            axes = dji.attitude_velocity_axes(u[1:], up, self.vehicle, limits)
-            return axes, (float(u[THRUST]), axes[0], axes[1], axes[3])
-        axes = dji.attitude_thrust_axes(u, self.vehicle, limits)
-        return axes, dji.input_from_axes(axes, self.vehicle)
-
-    def _hold_axes(self) -> dji.Axes:
-        return dji.velocity_axes((0.0, 0.0, 0.0), 0.0, self.params.setpoint_limits)
 
     def _sentence(self, seen: ModeInputs, verdict: Verdict) -> str:
         if self.mode is Mode.WAITING:
             return "; ".join(preflight(seen, self.params.modes)) or self._reason
-        planned = self.override.remark or verdict.sentence
-        return planned if self.mode in PLANNED else self._reason
+        if self.mode not in PLANNED:
+            return self._reason
+        if 2.0 * seen.effectless_time > self.params.modes.effect_brake:
+            return f"the aircraft does not follow the commands: {seen.effectless_time:.1f} s"
+        if battery_is_low(seen, self.params.modes):
+            return f"the battery is at {seen.battery:.0%}: {self.params.modes.battery_action}"
+        return self.override.remark or verdict.sentence

@@ -23,13 +23,14 @@ class Action(Enum):
     LAND = "land"
     SET_REFERENCE = "set the local position reference"
     HOLD = "tell the controller to hold"
+    RETURN = "tell the controller to fly to where automatic flight began"
 
 
 @dataclass(frozen=True)
 class GuardInputs:
     """What one tick sees."""
 
-    t: float  # [s]
+    t: float  # [s] clock of stamps
     telemetry: ModeInputs  # ages, RC, status, GPS, battery, authority, failure, request
     estimate: Optional[StateEstimate] = None
     height: float = math.nan  # [m] above take-off
@@ -38,6 +39,13 @@ class GuardInputs:
     goal: Goal = Goal.HOLD  # of the plan
     obstacles: Sequence[Obstacle] = ()
     obstacles_stale: str = ""  # what is known of them is too old to be flown on: why
+    yaw_disagreement: float = math.nan  # [rad] motion capture's less dji_sdk's; NaN: only one
+    steady: Optional[float] = None  # [s] clock that nobody sets; None: ``t``
+
+    @property
+    def now(self) -> float:
+        """Time [s] from which durations are taken."""
+        return self.t if self.steady is None else self.steady
 
 
 @dataclass(frozen=True)
@@ -47,8 +55,10 @@ class GuardOutput:
     mode: Mode
     rung: Rung
     reason: str
+    code: str = ""  # of the reason, for programs
     axes: Optional[Axes] = None  # Joy axes to publish; None: silence
     applied: Optional[Tuple[float, ...]] = None  # (4,) input that the axes command, where known
     actions: Tuple[Action, ...] = ()
     answer: Optional[Tuple[bool, str]] = None  # to the request
     clearance: float = math.inf  # [m] least along the plan
+    target: Optional[Tuple[float, float, float]] = None  # [m] of RETURN

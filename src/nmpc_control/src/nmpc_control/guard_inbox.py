@@ -2,15 +2,20 @@
 """What the guard has heard, and when: turns telemetry into the inputs of one tick."""
 
 import math
-from typing import Optional, Sequence, Tuple
+from collections import Counter
+from typing import Dict, Optional, Sequence, Tuple
 
 from nmpc_control import dji
 from nmpc_control.estimator import Estimator
 from nmpc_control.guard_data import GuardInputs
 from nmpc_control.guard_params import GuardParameters
+from nmpc_control.liveness import Liveness
 from nmpc_control.mode_inputs import ModeInputs, Request
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.state import Goal, Plan
+
+_STATE = ("attitude", "imu", "velocity", "position")
+_FAR = 1e6  # [s]
 
 
 class GuardInbox:
@@ -26,6 +31,10 @@ class GuardInbox:
         self.authority = False  # as far as the last answer of dji_sdk tells
         self.failure = ""  # how a service call failed, until the next tick
         self.request: Optional[Request] = None
+        self.needs_gps = params.position_source == "gps"  # the position comes from GPS
+        self.yaw_disagreement = math.nan  # [rad] motion capture's less dji_sdk's
+        self.rejected: Dict[str, int] = Counter()  # values that are not finite, per source
+        self._liveness = Liveness()
         self._switch = params.rc_switch
         self._rc: Tuple[float, Sequence[float]] = (-math.inf, ())
         self._left_f: Optional[dji.RcMode] = None  # since the last tick, however briefly
@@ -37,7 +46,8 @@ class GuardInbox:
         self._plan_error = ""
 
     def add_rc(self, t: float, axes: Sequence[float]) -> None:
-        """Take the axes of ``dji_sdk/rc``."""
+        """Take the axes of ``dji_sdk/rc``; what is not finite is no position of the switch."""
+        self._count("rc", axes)
         self._rc = (t, tuple(axes))
         mode = dji.rc_mode(axes, self._switch)
         if mode is not dji.RcMode.F:
@@ -53,10 +63,13 @@ class GuardInbox:
 
     def add_battery(self, t: float, percent: float) -> None:
         """Take a state of charge [percent] of ``dji_sdk/battery_state``."""
+        if self._count("battery", (percent,)):
+            return
         self._battery = (t, percent / 100.0)
 
     def add_height(self, height: float) -> None:
         """Take a height [m] of ``dji_sdk/height_above_takeoff``."""
+        self._count("height", (height,))
         self._height = height
 
     def add_plan(self, plan: Plan, goal: Goal) -> None:
@@ -67,22 +80,29 @@ class GuardInbox:
         """Note that a plan came that could not be read."""
         self._plan_error = sentence
 
-    def inputs(self, t: float) -> GuardInputs:
-        """Return what a tick at ``t`` [s] sees."""
+    @property
+    def refused(self) -> Dict[str, int]:
+        """How many values of which source were not finite, or no attitude."""
+        return dict(Counter(self.estimator.rejected) + Counter(self.rejected))
+
+    def inputs(self, t: float, steady: Optional[float] = None) -> GuardInputs:
+        """Return what a tick at ``t`` [s] sees; ``steady`` [s] is a clock that nobody sets."""
         estimate = self.estimator.estimate(t)
-        e, (rc_t, rc) = self.estimator, self._rc
+        rc = self._rc[1]
+        ages = {name: self._state_age(name, t, steady) for name in _STATE}
         telemetry = ModeInputs(
-            attitude_age=max(e.age("attitude", t), e.age("imu", t)),
-            velocity_age=e.age("velocity", t),
-            position_age=e.age("position", t),
-            rc_age=t - rc_t,
+            attitude_age=max(ages["attitude"], ages["imu"]),
+            velocity_age=ages["velocity"],
+            position_age=ages["position"],
+            rc_age=self._age("rc", self._rc[0], t, steady),
             rc=self._left_f or dji.rc_mode(rc, self._switch),
             sticks=dji.stick_deflection(rc),
-            status_age=t - self._status[0],
+            status_age=self._age("status", self._status[0], t, steady),
             flight_status=dji.flight_status(self._status[1]),
-            gps_age=t - self._gps[0],
+            gps_age=self._age("gps", self._gps[0], t, steady),
             gps_health=self._gps[1],
-            battery_age=t - self._battery[0],
+            needs_gps=self.needs_gps,
+            battery_age=self._age("battery", self._battery[0], t, steady),
             battery=self._battery[1],
             authority=self.authority,
             failure=self.failure,
@@ -101,4 +121,19 @@ class GuardInbox:
             goal=goal,
             obstacles=self.obstacles,
             obstacles_stale=self.obstacles_stale,
+            yaw_disagreement=self.yaw_disagreement,
+            steady=steady,
         )
+
+    def _age(self, name: str, stamp: float, t: float, steady: Optional[float]) -> float:
+        return self._liveness.age(name, stamp, t, t if steady is None else steady)
+
+    def _state_age(self, name: str, t: float, steady: Optional[float]) -> float:
+        later = t + _FAR  # an age now is cut off at 0, where a stamp lies ahead
+        return self._age(name, later - self.estimator.age(name, later), t, steady)
+
+    def _count(self, name: str, values: Sequence[float]) -> bool:
+        """Return whether a value is not finite, and count it."""
+        is_bad = not all(map(math.isfinite, values))
+        self.rejected[name] += is_bad
+        return is_bad

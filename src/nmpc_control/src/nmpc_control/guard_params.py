@@ -12,6 +12,7 @@ from nmpc_control.mode_inputs import ModeParameters
 from nmpc_control.params import Disturbance
 from nmpc_control.stopping import StoppingParameters
 from nmpc_control.verdict import PlanCheckParameters
+from nmpc_control.watch import WatchParameters
 
 
 def _positive() -> float:
@@ -36,6 +37,7 @@ class GuardParameters:
     brake: BrakeParameters = field()
     stopping: StoppingParameters = field()
     disturbance: Disturbance = field()
+    watch: WatchParameters = field()
 
 
 def load_guard_parameters(directory: Optional[Path] = None) -> GuardParameters:

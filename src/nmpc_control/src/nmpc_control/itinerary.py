@@ -36,6 +36,8 @@ class Itinerary:
         self._leg: Optional[Trajectory] = None
         self._clock: Optional[ReferenceClock] = None
         self._suspended: Optional[Goal] = None
+        self._left: Optional[float] = None  # [s] of the trajectory, where it goes on after a leg
+        self._waits_since: Optional[float] = None  # [s] for somebody to ask for it, since when
         self._held_since: Optional[float] = None
         self._settled_since: Optional[float] = None
 
@@ -45,6 +47,16 @@ class Itinerary:
             self._end(False, message)
         self._hold = (np.array(position, dtype=float), float(yaw))
 
+    @property
+    def pursued(self) -> bool:
+        """Whether there is a goal, be it suspended."""
+        return self.goal is not Goal.HOLD or self._suspended is not None
+
+    @property
+    def waits(self) -> bool:
+        """Whether a goal waits until ``take_up``."""
+        return self._waits_since is not None
+
     def suspend(self, position: np.ndarray, yaw: float) -> None:
         """Hold a position (3,) [m] and yaw [rad] for a while; the goal and its clock wait."""
         if self.goal is not Goal.HOLD:
@@ -52,10 +64,36 @@ class Itinerary:
         self._hold = (np.array(position, dtype=float), float(yaw))
 
     def resume(self, t: float) -> None:
-        """Go on at ``t`` [s] with the goal where it was suspended, if one was."""
-        if self._suspended is not None:
+        """Go on at ``t`` [s] with the goal where it was suspended, if nobody is to ask for it."""
+        if self._suspended is not None and not self.waits:
             self.goal, self._suspended = self._suspended, None
             self._clock.resume(t)
+
+    def leave_to_pilot(self, t: float, position: np.ndarray, yaw: float) -> None:
+        """Suspend the goal at ``t`` [s] until it is asked for, or ``flight.memory`` is over."""
+        self.suspend(position, yaw)
+        if self._suspended is None:
+            return
+        if self._waits_since is None:
+            self._waits_since = t
+        self.forget_in_time(t)
+
+    def forget_in_time(self, t: float) -> None:
+        """Drop a goal that has waited for too long at ``t`` [s]."""
+        if self.waits and t - self._waits_since > self.flight.memory:
+            self._end(False, f"not taken up again within {self.flight.memory:g} s")
+
+    def take_up(self, t: float, position: np.ndarray, yaw: float) -> None:
+        """Fly from a position (3,) [m] to where the goal was left, settle, and go on with it."""
+        suspended, time = self._suspended, self._clock.time
+        if suspended is Goal.APPROACH:
+            end = self._leg.sample(np.array([self._leg.duration]))
+            target, target_yaw, left = self._leg.end, float(end.yaw[0]), self._left
+        else:
+            there = self.trajectory.sample(np.array([time]))
+            target, target_yaw, left = there.position[0], float(there.yaw[0]), time
+        self._set_out(t, position, yaw, target, target_yaw)
+        self._left = left
 
     def go_to(
         self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float
@@ -70,11 +108,13 @@ class Itinerary:
         self._set_out(t, position, yaw, first.position[0], float(first.yaw[0]))
         self.trajectory = trajectory
 
-    def begin(self, t: float, trajectory: Trajectory) -> None:
-        """Start the trajectory's clock at ``t`` [s] wherever the aircraft is."""
+    def begin(self, t: float, trajectory: Trajectory, at: float = 0.0) -> None:
+        """Start the trajectory's clock at ``t`` [s] wherever the aircraft is; ``at`` [s] of it."""
         self.goal, self.outcome, self._suspended = Goal.TRAJECTORY, None, None
-        self.trajectory, self.clock_start = trajectory, t
-        self._clock = ReferenceClock(trajectory, t, self.flight)
+        self.trajectory, self.clock_start = trajectory, t - at
+        self._left = self._waits_since = None
+        self._clock = ReferenceClock(trajectory, t - at, self.flight)
+        self._clock.go_on(t, at)
 
     def is_going_to(self, target: np.ndarray) -> bool:
         """Return whether a target (3,) [m] is what ``go_to`` is under way to."""
@@ -146,6 +186,7 @@ class Itinerary:
     ) -> None:
         self.goal, self.outcome, self._suspended = Goal.APPROACH, None, None
         self.clock_start, self._settled_since = None, None
+        self._left = self._waits_since = None
         self._leg = approach(
             position,
             target,
@@ -173,7 +214,7 @@ class Itinerary:
         if self.trajectory is None:
             self._finish("arrived")
         else:
-            self.begin(t, self.trajectory)
+            self.begin(t, self.trajectory, self._left or 0.0)
 
     def _finish(self, message: str) -> None:
         last = self._path.sample(np.array([self._path.duration]))
@@ -189,4 +230,4 @@ class Itinerary:
     def _end(self, arrived: bool, message: str) -> None:
         self.goal, self.outcome = Goal.HOLD, Outcome(arrived, message)
         self._leg, self._clock, self.clock_start, self._held_since = None, None, None, None
-        self._suspended = None
+        self._suspended = self._left = self._waits_since = None

@@ -27,6 +27,7 @@ class Rung(IntEnum):
     BRAKE = 3
     BRAKE_BLIND = 4
     RELEASE = 5
+    LANDING = 6
 
 
 class PlanLadder:

@@ -37,6 +37,7 @@ class Request(Enum):
 AUTOMATIC = (Mode.TAKING_OFF, Mode.FLYING, Mode.HOVERING, Mode.BRAKING, Mode.LANDING)
 STREAMING = (Mode.FLYING, Mode.HOVERING, Mode.BRAKING)
 PLANNED = (Mode.FLYING, Mode.HOVERING)
+FOLLOWED = (Mode.MANUAL, Mode.WAITING, Mode.READY)  # not flown, but a goal may wait meanwhile
 STARTABLE = (Mode.WAITING, Mode.READY, Mode.RELEASED, Mode.FAULT)
 
 

@@ -189,6 +189,7 @@ class Flight:
     catch_up: float = _non_negative()  # [1] faster than its own pace after it has waited
     patience: float = _positive()  # [s] held up by obstacles after which a goal is given up
     state_timeout: float = _positive()  # [s] a state older than this is not flown on
+    memory: float = field(default=600.0, metadata={"min": 0.0})  # [s] a goal waits for the pilot
 
 
 @dataclass(frozen=True)

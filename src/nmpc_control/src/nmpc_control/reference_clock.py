@@ -42,6 +42,10 @@ class ReferenceClock:
         """Go on at ``t`` [s] where it was read last."""
         self._t, self.rate = t, 0.0
 
+    def go_on(self, t: float, time: float) -> None:
+        """Read ``time`` [s] at ``t`` [s] and run from there."""
+        self._t, self.time = t, time
+
     def read(self, times: np.ndarray) -> np.ndarray:
         """Return the trajectory's times [s] at times (M,) [s]."""
         return self.time + max(1.0, self.rate) * (times - self._t)

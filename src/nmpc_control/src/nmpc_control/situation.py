@@ -84,7 +84,7 @@ class Situation:
         """Return the telemetry with what the guard itself knows."""
         p = self.params
         self.loop.tick(i.now)
-        self._since = i.now if self._since is None else self._since
+        self._since = _since(self._since, True, i.now)
         telemetry = i.telemetry
         is_fresh = (
             telemetry.position_age <= p.modes.position_timeout
@@ -98,7 +98,6 @@ class Situation:
         low, critical = self._battery_times(i)
         return replace(
             telemetry,
-            needs_gps=p.position_source == "gps",
             switched_to_f=self._see_switch(telemetry),
             verified_plans=ladder.verified,
             plan_usable=(rung is not Rung.NONE or is_held) and is_fresh,
@@ -133,10 +132,8 @@ class Situation:
         """Return for how long [s] it has been in the air, at height, without climbing."""
         p = self.params
         steady = i.estimate is not None and abs(i.estimate.vector[VELOCITY][2]) <= p.height_speed
-        if not (i.telemetry.in_air and steady and i.height >= p.modes.take_off_height):
-            self._settled_since = None
-        elif self._settled_since is None:
-            self._settled_since = i.now
+        is_up = i.telemetry.in_air and steady and i.height >= p.modes.take_off_height
+        self._settled_since = _since(self._settled_since, is_up, i.now)
         return 0.0 if self._settled_since is None else i.now - self._settled_since
 
     def _battery_times(self, i: GuardInputs) -> Tuple[float, float]:
@@ -159,7 +156,7 @@ class Situation:
             self.refusal,
             start_checks.place(i.estimate, i.telemetry.on_ground, self.limits, watch),
             "the position jumps" if jumped else "",
-            start_checks.headings(i.estimate, i.captured_yaw, watch),
+            start_checks.headings(i.yaw_disagreement, watch),
             start_checks.loop(self.loop, watch),
         )
         return tuple(sentence for sentence in found if sentence)
@@ -177,7 +174,7 @@ class Situation:
 
 
 def _since(before: Optional[float], holds: bool, now: float) -> Optional[float]:
-    """Return since when something holds; None: it does not."""
+    """Return since when [s] something holds, at most ``now``; None: it does not."""
     if not holds:
         return None
-    return now if before is None else before
+    return now if before is None else min(before, now)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What stands against a start beyond ages and modes: thrust map, rest, place, headings, own loop."""
+"""What stands against a start beyond ages: thrust map, rest, place, headings, own loop."""
 
 import math
 from typing import Optional
@@ -9,8 +9,7 @@ import numpy as np
 from nmpc_control.estimator import StateEstimate
 from nmpc_control.loop_watch import LoopWatch
 from nmpc_control.params import Limits, Vehicle
-from nmpc_control.rotations import wrap_angle
-from nmpc_control.state import POSITION, VELOCITY, YAW
+from nmpc_control.state import POSITION, VELOCITY
 from nmpc_control.watch import WatchParameters
 
 OF_SIMULATOR = "simulator"  # in `measured_on`: a model's map, not an airframe's
@@ -57,14 +56,11 @@ def place(
     return ""
 
 
-def headings(estimate: Optional[StateEstimate], captured: float, p: WatchParameters) -> str:
-    """Return whether motion capture's yaw [rad] and dji_sdk's differ; empty: no, or only one."""
-    if estimate is None or not math.isfinite(captured):
+def headings(disagreement: float, p: WatchParameters) -> str:
+    """Return whether motion capture's yaw and dji_sdk's differ [rad]; empty: no, or only one."""
+    if not abs(disagreement) > p.yaw_agreement:  # NaN: only one
         return ""
-    difference = abs(wrap_angle(captured - float(estimate.vector[YAW])))
-    if difference <= p.yaw_agreement:
-        return ""
-    degrees = math.degrees(difference)
+    degrees = math.degrees(abs(disagreement))
     return f"the yaw of motion capture and of dji_sdk differ by {degrees:.0f} degrees"
 
 
@@ -73,4 +69,6 @@ def loop(watch: LoopWatch, p: WatchParameters) -> str:
     wanted = 1.0 / watch.period
     if not watch.rate < p.loop_rate * wanted:  # NaN: not known yet
         return ""
-    return f"the computer is overloaded: commands would leave at {watch.rate:.0f} of {wanted:.0f} Hz"
+    return (
+        f"the computer is overloaded: commands would leave at {watch.rate:.0f} of {wanted:.0f} Hz"
+    )

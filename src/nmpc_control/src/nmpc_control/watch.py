@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Watchdogs over the state: jumps of the position, fence, speed, tilt."""
+"""Watchdogs over the state: position against velocity, fence, speed, tilt.
+
+The position must go where the velocity leads. What it is off by is summed up and forgotten slowly,
+so that both a jump and a position that stands still while the aircraft moves are seen.
+"""
 
 import math
 from dataclasses import dataclass, field
@@ -12,6 +16,7 @@ from nmpc_control.params import Limits
 from nmpc_control.state import PITCH, POSITION, ROLL, VELOCITY
 
 LONGEST = 0.5  # [s] over which a position is compared with the one before
+MEMORY = 1.0  # [s] in which what it was off by is forgotten
 RECENT = 2.0  # [s] for which a jump stands against a start
 OUTWARD = 0.3  # [m/s] from which on it leaves the fence; slower may be noise
 
@@ -49,6 +54,7 @@ class Watch:
         self.alarm = ""  # why to brake; empty: nothing is wrong
         self.tilt_time = 0.0  # [s] for which the tilt has been beyond its limit
         self._before: Optional[StateEstimate] = None
+        self._off = np.zeros(3)  # [m] that velocity does not explain
         self._jumped = -math.inf
         self._tilted_since: Optional[float] = None
 
@@ -57,8 +63,8 @@ class Watch:
         self.alarm, self.tilt_time = "", 0.0
         if estimate is None:
             return
-        tilt = self._tilt(estimate)
-        self.alarm = tilt or self._jump(estimate) or self._motion(estimate.vector)
+        tilt, jump = self._tilt(estimate), self._jump(estimate)
+        self.alarm = tilt or jump or self._motion(estimate.vector)
         self._before = estimate
 
     def has_jumped(self, t: float) -> bool:
@@ -70,13 +76,14 @@ class Watch:
         dt = math.inf if before is None else estimate.t - before.t
         if not 0.0 < dt <= LONGEST:
             return ""
-        expected = before.vector[POSITION] + dt * before.vector[VELOCITY]
-        jump = float(np.linalg.norm(estimate.vector[POSITION] - expected))
-        if jump <= self.params.position_jump:
+        moved = estimate.vector[POSITION] - before.vector[POSITION]
+        self._off = self._off * math.exp(-dt / MEMORY) + moved - dt * before.vector[VELOCITY]
+        off = float(np.linalg.norm(self._off))
+        if off <= self.params.position_jump:
             return ""
+        self.jumps += estimate.t - self._jumped > dt * 1.5
         self._jumped = estimate.t
-        self.jumps += 1
-        return f"the position jumped by {jump:.1f} m"
+        return f"the position is {off:.1f} m from where the velocity leads"
 
     def _motion(self, x: np.ndarray) -> str:
         p = self.params

@@ -12,7 +12,7 @@ from nmpc_control.guard import Guard
 from nmpc_control.guard_data import Action, GuardOutput
 from nmpc_control.guard_inbox import GuardInbox
 from nmpc_control.guard_params import GuardParameters
-from nmpc_control.mode_inputs import PLANNED, STREAMING, Mode, Request
+from nmpc_control.mode_inputs import FOLLOWED, PLANNED, STREAMING, Mode, Request
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters
 from nmpc_control.scenario import Scenario
@@ -27,6 +27,7 @@ OBSTACLE_PERIOD = 0.1  # [s] between two lists of sensed obstacles
 _START_TIMEOUT = 30.0  # [s] from the first packet to automatic flight
 _AFTER_ARRIVAL = 1.0  # [s] of hover that is still recorded
 _GENERIC = "generic"
+_SWITCH_TO_F = 0.1  # [s] when the pilot hands over: the guard must see the switch move
 
 
 @dataclass
@@ -73,7 +74,9 @@ class ClosedLoop:
         self._ticks = _every(1.0 / guard_parameters.rate, preset.step)
         self._solves = _every(1.0 / parameters.solver.budget.rate, preset.step)
         self._looks = _every(OBSTACLE_PERIOD, preset.step)
+        self._handover = _every(_SWITCH_TO_F, preset.step)
         self._count = 0
+        self.aircraft.rc.mode = "P"
 
     @property
     def t(self) -> float:
@@ -90,6 +93,8 @@ class ClosedLoop:
         if self.senses and self._count % self._looks == 0:
             self._look()
         self._count += 1
+        if self._count == self._handover:
+            self.aircraft.rc.mode = "F"
         if self._count % self._solves == 0:
             self._solve()
         if self._count % self._ticks == 0:
@@ -135,16 +140,17 @@ class ClosedLoop:
     def _tick(self) -> None:
         output = self.guard.tick(self.inbox.inputs(self.t))
         for action in output.actions:
-            self._act(action)
+            self._act(action, output)
         if output.axes is not None:
             self.aircraft.setpoint(_GENERIC, output.axes)
         known = output.axes is not None and output.applied is not None
         self.controller.record_input(self.t, np.array(output.applied) if known else None)
         self.controller.engaged = output.mode in PLANNED
         self.controller.braking = output.mode is Mode.BRAKING
+        self.controller.manual = output.mode in FOLLOWED
         self.log.outputs.append((self.t, output))
 
-    def _act(self, action: Action) -> None:
+    def _act(self, action: Action, output: GuardOutput) -> None:
         if action is Action.OBTAIN_AUTHORITY:
             self.inbox.authority = self.aircraft.control_authority(True).result
         elif action is Action.RELEASE_AUTHORITY:
@@ -159,6 +165,9 @@ class ClosedLoop:
         elif action is Action.HOLD:
             x = self.controller.estimator.estimate(self.t).vector
             self.controller.itinerary.hold(x[:3], x[5])
+        elif action is Action.RETURN:
+            x = self.controller.estimator.estimate(self.t).vector
+            self.controller.itinerary.go_to(self.t, x[:3], x[5], np.array(output.target), x[5])
 
 
 def fly(
