@@ -30,6 +30,7 @@ ON_GROUND = {"flight_status": FlightStatus.ON_GROUND}
 IN_AIR = {"flight_status": FlightStatus.IN_AIR, "authority": True}
 SETTLED = {**IN_AIR, "settled_time": P.take_off_settle}
 NO_PLAN = {"plan_usable": False, "plan_finding": "the plan is 0.60 s old"}
+GIVEN_BACK = {"brakes_after_start": True}
 OLD = 0.6  # [s] older than any state timeout
 
 # mode, what differs from good, mode that follows, part of the reason
@@ -114,6 +115,15 @@ TABLE = [
     (Mode.BRAKING, {**IN_AIR, "usable_time": 0.9}, Mode.BRAKING, ""),
     (Mode.BRAKING, {**IN_AIR, "time_in_mode": 0.9}, Mode.BRAKING, ""),
     (Mode.BRAKING, {**IN_AIR, **NO_PLAN}, Mode.BRAKING, ""),
+    (Mode.BRAKING, {**IN_AIR, "speed": 3.0}, Mode.HOVERING, "usable again"),
+    (Mode.BRAKING, {**IN_AIR, **GIVEN_BACK, "speed": 3.0}, Mode.BRAKING, ""),
+    (Mode.BRAKING, {**IN_AIR, **GIVEN_BACK, "speed": 0.4}, Mode.HOVERING, "usable again"),
+    (
+        Mode.BRAKING,
+        {**IN_AIR, **GIVEN_BACK, "speed": 3.0, "time_in_mode": 6.1},
+        Mode.HOVERING,
+        "usable again",
+    ),
     (Mode.BRAKING, {**IN_AIR, "authority": False}, Mode.BRAKING, ""),
     (
         Mode.BRAKING,

@@ -144,6 +144,8 @@ class Itinerary:
             return
         near = np.linalg.norm(position - self._target()) < self.flight.arrival_distance
         at_rest = near and np.linalg.norm(velocity) < self.flight.arrival_speed
+        if self._left is not None:  # the trajectory goes on in motion: the place is enough
+            at_rest = np.linalg.norm(position - self._target()) < self.flight.wait_lag
         if self.goal is Goal.APPROACH:
             self._update_approach(t, position, bool(at_rest), held_up)
         elif self._clock.over >= 0.0:

@@ -39,8 +39,10 @@ def start(condition: Condition) -> Condition:
 
 
 def recovered(i: ModeInputs, p: ModeParameters) -> bool:
-    """Return whether braking may end."""
+    """Return whether braking may end; what the pilot gave over in motion comes to rest first."""
     waited = i.time_in_mode >= p.brake_dwell and i.usable_time >= p.recover_time
+    if i.brakes_after_start:
+        waited &= i.speed <= p.return_speed or i.time_in_mode > p.return_brake
     return waited and i.plan_usable and i.authority and not i.alarm
 
 

@@ -80,6 +80,8 @@ class ModeParameters:
     authority_timeout: float = _positive()  # [s] in the air; a service of dji_sdk may take 10 s
     brake_dwell: float = _not_negative()  # [s] least time in BRAKING
     recover_time: float = _not_negative()  # [s] of usable plans that ends BRAKING
+    return_speed: float = _positive()  # [m/s] at which a start in the air has done braking
+    return_brake: float = _positive()  # [s] after which it has anyway
     blind_timeout: float = _positive()  # [s] of braking without position
     tilt_timeout: float = _not_negative()  # [s] of tilt beyond the limit
     effect_brake: float = _positive()  # [s] of commands without effect before it brakes
@@ -116,6 +118,8 @@ class ModeInputs:
     settled_time: float = 0.0  # [s] in the air at take-off height without moving vertically
     blind_time: float = 0.0  # [s] without position
     brake_time_left: float = math.inf  # [s] until a brake without velocity has done its work
+    speed: float = 0.0  # [m/s]
+    brakes_after_start: bool = False  # this BRAKING is that of a start in the air
     alarm: str = ""  # what a watchdog sees that calls for a brake
     tilt_time: float = 0.0  # [s] for which the tilt has been beyond its limit
     effectless_time: float = 0.0  # [s] of commands without effect, in this mode

@@ -38,6 +38,7 @@ class Situation:
         self.effect = CommandEffect(vehicle, params.watch.effect_tilt)
         self.home: Optional[np.ndarray] = None  # (3,) [m] where automatic flight began
         self._since: Optional[float] = None  # [s] steady clock, when the mode began
+        self._brakes_after_start = False
         self._was_away = self._switched = False
         self._low_since: Optional[float] = None
         self._critical_since: Optional[float] = None
@@ -54,6 +55,7 @@ class Situation:
         """Note a change of mode."""
         self._since = i.now
         self.effect.enter_mode()
+        self._brakes_after_start = mode is Mode.BRAKING and before not in AUTOMATIC
         if mode is Mode.MANUAL:
             self._switched, self._was_away = False, i.telemetry.rc in (dji.RcMode.P, dji.RcMode.A)
         if mode in AUTOMATIC and before not in AUTOMATIC:
@@ -107,6 +109,8 @@ class Situation:
             settled_time=self._settled_time(i),
             blind_time=telemetry.position_age if blind else 0.0,
             brake_time_left=self._brake_time_left(i, telemetry),
+            speed=_speed(i.estimate),
+            brakes_after_start=self._brakes_after_start,
             alarm=self.watch.alarm,
             tilt_time=self.watch.tilt_time,
             effectless_time=self.effect.time,
@@ -178,3 +182,7 @@ def _since(before: Optional[float], holds: bool, now: float) -> Optional[float]:
     if not holds:
         return None
     return now if before is None else min(before, now)
+
+
+def _speed(estimate: Optional[StateEstimate]) -> float:
+    return 0.0 if estimate is None else float(np.linalg.norm(estimate.vector[VELOCITY]))

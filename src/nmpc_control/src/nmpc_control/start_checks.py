@@ -43,8 +43,8 @@ def place(
         return ""
     position, velocity = estimate.vector[POSITION], estimate.vector[VELOCITY]
     axes = slice(0, 2) if on_ground else slice(0, 3)  # the ground lies below the fence
-    low, high = limits.fence_min[axes], limits.fence_max[axes]
-    if not bool(np.all((position[axes] >= low) & (position[axes] <= high))):
+    low, high = limits.fence_min - p.fence_margin, limits.fence_max + p.fence_margin
+    if np.any((position < low)[axes]) or np.any((position > high)[axes]):
         return f"the position {np.round(position, 1)} m is outside of the fence"
     if not on_ground:
         return ""
