@@ -164,8 +164,8 @@ COURSE: Tuple[Rule, ...] = (
         "recovered",
         (Mode.BRAKING,),
         Mode.FLYING,
-        "after `brake_dwell`, plans usable for `recover_time`, no alarm, authority; after a start in "
-        "the air also slower than `return_speed`, or `return_brake` over; a goal",
+        "after `brake_dwell`, plans usable for `recover_time`, no alarm, authority; after a start "
+        "in the air also slower than `return_speed`, or `return_brake` over; a goal",
         lambda i, p: recovered(i, p) and i.goal is not Goal.HOLD,
         "plans are usable again",
     ),

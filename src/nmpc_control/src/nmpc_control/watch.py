@@ -33,7 +33,7 @@ class WatchParameters:
     fence_margin: float = _positive()  # [m] beyond the fence, moving outward
     tilt: float = _positive()  # [rad] more than DJI's own control ever tilts
     speed: float = _positive()  # [m/s]
-    effect_tilt: float = _positive()  # [rad] from which on commands must show an effect
+    effect_tilt: float = _positive()  # [rad] rms of commands that must show an effect
     rest_speed: float = _positive()  # [m/s] of an aircraft that stands on the ground
     start_height: float = _positive()  # [m] of one, above or below the local origin
     yaw_agreement: float = _positive()  # [rad] between motion capture and dji_sdk
