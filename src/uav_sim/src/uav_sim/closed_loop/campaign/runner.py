@@ -13,7 +13,6 @@ from uav_sim.closed_loop.campaign.settings import Settings
 from uav_sim.closed_loop.campaign.suites import draw_flight
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
-_AHEAD = 2  # flights for each worker that are handed out
 
 
 def fly_number(settings: Settings, index: int) -> Row:
@@ -53,7 +52,7 @@ def run(
     under_way: Set["Future[Row]"] = set()
     try:
         while True:
-            under_way |= _submitted(pool, settings, todo, _AHEAD * workers - len(under_way))
+            under_way |= _submitted(pool, settings, todo, workers - len(under_way))
             if not under_way:
                 return
             under_way = _finished(under_way, on_row)

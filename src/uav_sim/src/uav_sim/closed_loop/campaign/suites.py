@@ -6,7 +6,7 @@ from zlib import crc32
 
 import numpy as np
 
-from uav_sim.closed_loop.campaign import appearing, head_on, moving, static_fields
+from uav_sim.closed_loop.campaign import appearing, head_on, moving, no_way, static_fields
 from uav_sim.closed_loop.campaign.draw import Flight, Sketch
 
 SUITES: Dict[str, Callable[[np.random.Generator], Sketch]] = {
@@ -14,6 +14,7 @@ SUITES: Dict[str, Callable[[np.random.Generator], Sketch]] = {
     "moving": moving.draw,
     "appearing": appearing.draw,
     "head_on": head_on.draw,
+    "no_way": no_way.draw,
 }
 
 

@@ -31,9 +31,11 @@ _OPTIONS = {
     "ipopt.sb": "yes",
     "print_time": False,
     "ipopt.max_iter": 150,
-    "ipopt.tol": 1e-4,
-    "ipopt.acceptable_tol": 1e-3,
-    "ipopt.mu_strategy": "adaptive",
+    "ipopt.tol": 1e-3,  # the result is checked anyway
+    "ipopt.acceptable_tol": 1e-2,
+    "ipopt.acceptable_iter": 5,
+    "ipopt.mu_strategy": "monotone",  # the adaptive one runs into the limit of iterations here
+    "ipopt.mu_init": 0.1,
 }
 
 
