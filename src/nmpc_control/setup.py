@@ -10,6 +10,7 @@ setup(
             "nmpc_control",
             "nmpc_control.analysis",
             "nmpc_control.analysis.identification",
+            "nmpc_control.laser_tracking",
             "nmpc_control.ros",
         ],
         package_dir={"": "src"},

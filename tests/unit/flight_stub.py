@@ -117,6 +117,7 @@ class Flight:
         self.t = 100.0
         self.change = {}  # telemetry that differs from good
         self.obstacles = ()
+        self.stale = ""  # why the obstacles are not known well enough
         self.log = []  # (t, inputs, output)
 
     def tick(self, request=None, **changes):
@@ -146,6 +147,7 @@ class Flight:
             plan=offered,
             goal=goal,
             obstacles=self.obstacles,
+            obstacles_stale=self.stale,
         )
         output = self.guard.tick(inputs)
         self.aircraft.serve(output.actions)

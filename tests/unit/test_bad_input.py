@@ -123,7 +123,7 @@ def test_obstacles_without_a_slot_are_told():
 def test_parameters_that_cannot_be_meant_are_refused_by_name(part, values, named):
     p = replaced(load_parameters(), part, **values)
     with pytest.raises(ProblemError, match=named):
-        pack_theta(p.vehicle, p.weights, p.limits, p.avoidance, np.zeros(3))
+        pack_theta(p.vehicle, p.weights, p.limits, p.avoidance)
 
 
 def test_a_flight_that_starts_in_an_obstacle_is_refused_when_it_is_planned(tmp_path):

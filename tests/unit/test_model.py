@@ -1,6 +1,7 @@
 """The symbolic model against exact solutions, SciPy's integrator and the plain-float twin."""
 
 import dataclasses
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -98,7 +99,7 @@ def worst_errors(vehicle: Vehicle, integrator: str, count: int = 100) -> dict:
 
     Relative to what that part changes in the same step (Euclidean norms).
     """
-    p = model_parameters(vehicle, np.array([0.3, -0.2, 0.1]))
+    p = model_parameters(replace(vehicle, disturbance=np.array([0.3, -0.2, 0.1])))
     F, exact = step_function(DT, integrator), reference_step(DT)
     rng = np.random.default_rng(1)
     worst = dict.fromkeys(PARTS, 0.0)
@@ -134,7 +135,7 @@ def test_rk4_is_not_for_the_papers_lag():
 @pytest.mark.parametrize("name", VEHICLES)
 def test_reference_step_agrees_with_scipy_over_one_step(name):
     vehicle = load_vehicle(name)
-    p = model_parameters(vehicle, np.array([0.3, -0.2, 0.1]))
+    p = model_parameters(replace(vehicle, disturbance=np.array([0.3, -0.2, 0.1])))
     x_symbol, u_symbol, p_symbol = (
         ca.SX.sym("x", NX),
         ca.SX.sym("u", NU),

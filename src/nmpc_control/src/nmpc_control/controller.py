@@ -5,23 +5,27 @@ Estimate, delay, reference, obstacles, solve.
 """
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Deque, Optional, Sequence, Tuple
 
 import numpy as np
 
+from nmpc_control.disturbance_estimate import DisturbanceEstimate, steady_input
 from nmpc_control.errors import ProblemError
 from nmpc_control.estimator import Estimator, StateEstimate
 from nmpc_control.itinerary import Itinerary
 from nmpc_control.nmpc import Nmpc
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_field import ObstacleField
-from nmpc_control.params import Parameters
+from nmpc_control.params import Parameters, Vehicle
 from nmpc_control.prediction import predict
 from nmpc_control.solution import no_solution
 from nmpc_control.state import POSITION, VELOCITY, YAW, Goal, Plan, hover_input
 
 _INPUT_MEMORY = 2.0  # [s] inputs older than this cannot matter for the delay
+_FORGOTTEN = 0.5  # [s] after its effect an input no longer shows in the attitude
+_REACTION = 0.3  # [s] for which a velocity is missed before the plan makes up for it
+_MOST_MISSED = 0.3  # [m]
 
 
 @dataclass(frozen=True)
@@ -56,17 +60,29 @@ class Controller:
         self.nmpc = Nmpc(parameters)
         self.obstacles: Sequence[Obstacle] = ()
         self.engaged = False  # the guard flies these plans
+        self.braking = False  # it does not, but brakes and will again
         self._inputs: Deque[Tuple[float, np.ndarray]] = deque()
+        self._unknown = -np.inf  # [s] when an input was sent last that the model does not have
+        self._disturbance = DisturbanceEstimate(parameters.disturbance)
 
     def use(self, parameters: Parameters) -> None:
         """Take over other weights, limits or margins from the next step on."""
         self.parameters = parameters
         self.nmpc.use(parameters)
 
-    def record_input(self, t: float, u: np.ndarray) -> None:
-        """Remember the input (4,) that was really sent at time ``t`` [s]."""
-        if not np.all(np.isfinite(u)):
-            return
+    @property
+    def disturbance(self) -> np.ndarray:
+        """The acceleration (3,) [m/s^2] in the world frame that the model was found to lack."""
+        return self._disturbance.acceleration
+
+    def record_input(self, t: float, u: Optional[np.ndarray]) -> None:
+        """Remember the input (4,) that was really sent at time ``t`` [s].
+
+        None: something that the model does not have, as DJI's own velocity control or the pilot's;
+        level hover is the nearest that is.
+        """
+        if u is None or not np.all(np.isfinite(u)):
+            u, self._unknown = hover_input(), t
         self._inputs.append((t, np.array(u, dtype=float)))
         while self._inputs[0][0] < t - _INPUT_MEMORY:
             self._inputs.popleft()
@@ -79,13 +95,16 @@ class Controller:
             return None
         x = estimate.vector
         if not self.engaged:
-            self.itinerary.hold(x[POSITION], x[YAW], "automatic flight ended")
-        self.itinerary.update(t, x[POSITION], x[VELOCITY])
+            self._stand_by(x)
+        else:
+            self.itinerary.resume(t)
+        self.itinerary.update(t, x[POSITION], x[VELOCITY], bool(self.nmpc.held_up_by))
 
-        x0 = predict(x, t, t + self.parameters.vehicle.delay, self._inputs, self.parameters.vehicle)
+        vehicle = self._learn(t, x)
+        x0 = predict(x, t, t + vehicle.delay, self._inputs, vehicle)
         times = self.nmpc.stage_times(t)
         references = self.itinerary.reference(times)
-        plan = self._solve(t, x0, references)
+        plan = self._solve(t, x0, references, steady_input(vehicle, references[0, YAW]))
         return Step(
             estimate=estimate,
             reference=self.itinerary.reference(np.array([t]))[0],
@@ -97,13 +116,34 @@ class Controller:
             predicted_clearance=self._clearance(plan.states[:, POSITION], times),
         )
 
-    def _solve(self, t: float, x0: np.ndarray, references: np.ndarray) -> Plan:
+    def _stand_by(self, x: np.ndarray) -> None:
+        """Plan for where the aircraft is; a goal outlasts the guard's braking, nothing else."""
+        if self.braking:
+            self.itinerary.suspend(x[POSITION], x[YAW])
+        else:
+            self.itinerary.hold(x[POSITION], x[YAW], "automatic flight ended")
+
+    def _learn(self, t: float, x: np.ndarray) -> Vehicle:
+        """Return the model with what it was found to lack, also told to the optimiser."""
+        estimate, vehicle = self._disturbance, self.parameters.vehicle
+        if not self.engaged:
+            estimate.reset()
+        elif t - self._unknown < vehicle.delay + _FORGOTTEN:
+            estimate.pause()
+        else:
+            known = replace(vehicle, disturbance=vehicle.disturbance + estimate.acceleration)
+            estimate.update(t, x, self._inputs, known)
+        disturbance = vehicle.disturbance + estimate.acceleration
+        self.nmpc.expect(disturbance, min(_REACTION * estimate.miss, _MOST_MISSED))
+        return replace(vehicle, disturbance=disturbance)
+
+    def _solve(self, t: float, x0: np.ndarray, references: np.ndarray, u_ref: np.ndarray) -> Plan:
         """Return the plan; one that is not found where the problem cannot be posed at all.
 
         A control tick raises nothing: an obstacle that is nowhere is a reason, not an exception.
         """
         try:
-            return self.nmpc.solve(t, x0, references, self._input_before(t), self.obstacles)
+            return self.nmpc.solve(t, x0, references, self._input_before(t), self.obstacles, u_ref)
         except ProblemError as error:
             self.nmpc.reset()
             nothing = no_solution(x0, self.nmpc.structure.horizon, str(error))

@@ -2,14 +2,14 @@
 """The safety process without ROS: plan check, ladder, modes and the setpoint of one tick."""
 
 import math
-from collections import deque
 from dataclasses import dataclass, replace
-from typing import Deque, Optional, Sequence, Tuple
+from typing import Callable, Optional, Sequence, Tuple
 
 import numpy as np
 
 from nmpc_control import dji, modes
 from nmpc_control.braking import Brake
+from nmpc_control.disturbance_estimate import DisturbanceEstimate
 from nmpc_control.estimator import StateEstimate
 from nmpc_control.guard_data import Action, GuardInputs, GuardOutput
 from nmpc_control.guard_params import GuardParameters
@@ -23,22 +23,16 @@ from nmpc_control.mode_inputs import (
     Request,
     preflight,
 )
+from nmpc_control.obstacle import Obstacle
+from nmpc_control.obstacle_field import ObstacleField
+from nmpc_control.override import Override
 from nmpc_control.params import Limits, Vehicle
-from nmpc_control.plan_check import Verdict
-from nmpc_control.prediction import predict
-from nmpc_control.state import (
-    PITCH,
-    PITCH_REF,
-    ROLL,
-    ROLL_REF,
-    THRUST,
-    VELOCITY,
-    hover_input,
-    hover_state,
-)
+from nmpc_control.sent_inputs import SentInputs
+from nmpc_control.state import THRUST, VELOCITY, hover_input
+from nmpc_control.verdict import Verdict
 
-INPUT_MEMORY = 2.0  # [s] inputs sent earlier cannot matter for the delay
 MAX_TICK = 0.1  # [s] a longer pause between ticks counts as this
+FORGOTTEN = 0.5  # [s] after its effect an input no longer shows in the attitude
 MAX_FAILURES = 10  # [1] ticks in a row that may raise before authority is released
 
 
@@ -57,8 +51,15 @@ class Guard:
         self.params = params
         self.vehicle = vehicle
         self.mode = Mode.WAITING
+        self._sent = SentInputs(vehicle)
         self.ladder = PlanLadder(params.plan_check, params.hold_timeout, vehicle, limits)
         self._brake = Brake(vehicle, limits, params.brake)
+        self.override = Override(
+            params.stopping, params.brake, vehicle, 1.0 / params.rate, params.plan_check
+        )
+        self._obstacles = ObstacleField(())
+        self._converted: Sequence[Obstacle] = ()
+        self._disturbance = DisturbanceEstimate(params.disturbance)
         self._reason = ""
         self._failures = 0
         self._forget(-math.inf)
@@ -68,18 +69,28 @@ class Guard:
         if i.t < self._t:
             self._forget(i.t)
         dt, self._t = min(max(i.t - self._t, 0.0), MAX_TICK), i.t
-        self._take_plan(i)
-        rung, verdict = self.ladder.assess(i.t, i.obstacles)
+        obstacles = self._as_field(i.obstacles)
+        self._learn(i)
+
+        def brake_clearance() -> float:
+            state, when = self._state_in_effect(i), i.t + self.vehicle.delay
+            return self.override.brake_clearance(state, when, obstacles)
+
+        self._take_plan(i, obstacles, brake_clearance)
+        rung, verdict = self.ladder.assess(i.t, obstacles, brake_clearance)
         seen = self._seen(i, rung, verdict)
         answer = modes.answer(self.mode, seen, self.params.modes) if seen.request else None
         actions = self._change_mode(i, seen, answer)
-        command = self._command(i, seen, rung, dt)
-        self._remember(i.t, command)
+        override = self._overridden(i, verdict, obstacles)
+        command = self._command(i, seen, rung, dt, override)
+        if command.axes is not None:
+            self._sent.add(i.t, command.applied)
+        self._sent.trim(i.t)
         self._failures = 0
         return GuardOutput(
             mode=self.mode,
             rung=command.rung,
-            reason=self._sentence(seen, verdict),
+            reason=override or self._sentence(seen, verdict),
             axes=command.axes,
             applied=command.applied,
             actions=actions,
@@ -108,17 +119,59 @@ class Guard:
         self._reference_asked = -math.inf
         self._settled_since: Optional[float] = None
         self._last_good: Optional[StateEstimate] = None
-        self._inputs: Deque[Tuple[float, np.ndarray]] = deque()
+        self._sent.forget()
+        self._disturbance.reset()
         self.ladder.forget()
+        self.override.forget()
 
-    def _take_plan(self, i: GuardInputs) -> None:
+    def _learn(self, i: GuardInputs) -> None:
+        """Take what the model lacks into it; only plans are flown by inputs that it has."""
+        estimate, vehicle = self._disturbance, self.vehicle
+        if self.mode not in PLANNED:
+            estimate.reset()
+        elif i.t - self._sent.unknown < vehicle.delay + FORGOTTEN or i.estimate is None:
+            estimate.pause()
+        else:
+            history, known = self._sent.history, self._sent.vehicle
+            estimate.update(i.t, i.estimate.vector, history, known)
+        push = vehicle.disturbance + estimate.acceleration
+        self._sent.vehicle = self.ladder.vehicle = replace(vehicle, disturbance=push)
+
+    def _as_field(self, obstacles: Sequence[Obstacle]) -> ObstacleField:
+        """Return obstacles as arrays, made once for each tuple of them."""
+        if obstacles is not self._converted or not isinstance(obstacles, tuple):
+            self._obstacles, self._converted = ObstacleField(obstacles), obstacles
+        return self._obstacles
+
+    def _take_plan(
+        self, i: GuardInputs, obstacles: ObstacleField, brake_clearance: Callable[[], float]
+    ) -> None:
         if i.plan_error:
             self.ladder.refuse(i.plan_error)
         if i.plan is not None:
             state = None if i.estimate is None else i.estimate.vector
             self.ladder.take(
-                i.plan, i.goal, t=i.t, state=state, inputs=self._inputs, obstacles=i.obstacles
+                i.plan,
+                i.goal,
+                t=i.t,
+                state=state,
+                inputs=self._sent.history,
+                obstacles=obstacles,
+                brake_clearance=brake_clearance,
             )
+
+    def _overridden(self, i: GuardInputs, verdict: Verdict, obstacles: ObstacleField) -> str:
+        """Return why to brake although there is a plan; empty where that is not so."""
+        if self.mode not in PLANNED:
+            self.override.forget()
+            return ""
+        was_active = self.override.active
+        state = None if i.estimate is None else self._state_in_effect(i)
+        plan = self.ladder.flown
+        reason = self.override.reason(i.t, i.obstacles_stale, state, obstacles, plan, verdict)
+        if reason and not was_active:
+            self._brake.begin(self._sent.last(i.t, i.estimate))
+        return reason
 
     def _seen(self, i: GuardInputs, rung: Rung, verdict: Verdict) -> ModeInputs:
         """Return the telemetry with what the guard itself knows."""
@@ -136,11 +189,13 @@ class Guard:
         elif self._settled_since is None:
             self._settled_since = i.t
         blind = telemetry.position_age > p.modes.position_timeout and not self._gps_holds(telemetry)
+        # while it is held back for obstacles long unseen, what they may have grown to is no news
+        is_held = bool(i.obstacles_stale) and self.mode in PLANNED and self.ladder.is_blocked(i.t)
         return replace(
             telemetry,
             needs_gps=p.position_source == "gps",
             verified_plans=self.ladder.verified,
-            plan_usable=rung is not Rung.NONE and is_fresh,
+            plan_usable=(rung is not Rung.NONE or is_held) and is_fresh,
             plan_finding="" if verdict.ok else verdict.sentence,
             usable_time=self.ladder.usable_time(i.t) if is_fresh else 0.0,
             goal=self.ladder.goal,
@@ -184,7 +239,7 @@ class Guard:
             self.ladder.stop_expecting()
         if after is not before:
             if after in (Mode.BRAKING, Mode.LANDING):
-                self._brake.begin(self._input_before(i))
+                self._brake.begin(self._sent.last(i.t, i.estimate))
             self._enter(after, i.t, transition.reason)
         if self._wants_reference(i.t, seen):
             self._reference_asked = i.t
@@ -206,14 +261,16 @@ class Guard:
         is_fresh = telemetry.gps_age <= self.params.modes.status_timeout
         return is_fresh and telemetry.gps_health > dji.TRUSTED_GPS_HEALTH
 
-    def _command(self, i: GuardInputs, seen: ModeInputs, rung: Rung, dt: float) -> _Command:
-        if self.mode in PLANNED:
+    def _command(
+        self, i: GuardInputs, seen: ModeInputs, rung: Rung, dt: float, override: str
+    ) -> _Command:
+        if self.mode in PLANNED and not override:
             plan = self.ladder.plan
             up = float(plan.state_at(i.t + plan.delay)[VELOCITY][2])
             return _Command(rung, *self._axes(plan.input_at(i.t), up))
         # until DJI's own landing has begun: silence while a service call blocks is nobody's control
         awaits_landing = self.mode is Mode.LANDING and seen.in_air
-        if self.mode is not Mode.BRAKING and not awaits_landing:
+        if self.mode is not Mode.BRAKING and not awaits_landing and not override:
             return _Command(Rung.RELEASE if self.mode is Mode.RELEASED else Rung.NONE)
         has_position = seen.position_age <= self.params.modes.position_timeout
         has_velocity = seen.velocity_age <= self.params.modes.velocity_timeout
@@ -223,16 +280,15 @@ class Guard:
         if self._gps_holds(seen):
             self._brake.begin(hover_input())  # where a brake of our own would have to go on from
             return _Command(rung, self._hold_axes())
-        state = self._state_in_effect(i, has_velocity)
+        state = self._state_in_effect(i)
         u = self._brake.input(state, dt, has_position and has_velocity)
         return _Command(rung, *self._axes(u, 0.0))
 
-    def _state_in_effect(self, i: GuardInputs, has_velocity: bool) -> np.ndarray:
+    def _state_in_effect(self, i: GuardInputs) -> np.ndarray:
         """Return the state (10,) expected when a command sent now takes effect."""
+        has_velocity = i.telemetry.velocity_age <= self.params.modes.velocity_timeout
         known = i.estimate if has_velocity and i.estimate is not None else self._last_good
-        if known is None:
-            return hover_state(np.zeros(3))
-        return predict(known.vector, known.t, i.t + self.vehicle.delay, self._inputs, self.vehicle)
+        return self._sent.state_in_effect(i.t, known)
 
     def _axes(self, u: Sequence[float], up: float) -> Tuple[dji.Axes, Tuple[float, ...]]:
         """Return the axes for an input (4,) and the input that they really command."""
@@ -246,25 +302,9 @@ class Guard:
     def _hold_axes(self) -> dji.Axes:
         return dji.velocity_axes((0.0, 0.0, 0.0), 0.0, self.params.setpoint_limits)
 
-    def _remember(self, t: float, command: _Command) -> None:
-        if command.axes is not None:
-            # DJI's own hold is not in the model; level hover is the nearest that is
-            u = hover_input() if command.applied is None else np.array(command.applied)
-            self._inputs.append((t, u))
-        while self._inputs and self._inputs[0][0] < t - INPUT_MEMORY:
-            self._inputs.popleft()
-
-    def _input_before(self, i: GuardInputs) -> np.ndarray:
-        """Return the input (4,) sent last, or the one that explains the present attitude."""
-        if self._inputs and i.t - self._inputs[-1][0] <= MAX_TICK:
-            return self._inputs[-1][1]
-        u = hover_input()
-        if i.estimate is not None:
-            u[ROLL_REF] = i.estimate.vector[ROLL] / self.vehicle.roll.gain
-            u[PITCH_REF] = i.estimate.vector[PITCH] / self.vehicle.pitch.gain
-        return u
-
     def _sentence(self, seen: ModeInputs, verdict: Verdict) -> str:
         if self.mode is Mode.WAITING:
             return "; ".join(preflight(seen, self.params.modes)) or self._reason
-        return verdict.sentence if self.mode in PLANNED else self._reason
+        if self.mode not in PLANNED:
+            return self._reason
+        return self.override.remark or verdict.sentence

@@ -37,6 +37,7 @@ class GuardInputs:
     plan_error: str = ""  # a plan came since the last tick that could not be read: why
     goal: Goal = Goal.HOLD  # of the plan
     obstacles: Sequence[Obstacle] = ()
+    obstacles_stale: str = ""  # what is known of them is too old to be flown on: why
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,9 @@ from nmpc_control.braking import BrakeParameters
 from nmpc_control.config import config_directory, from_dict, load_yaml
 from nmpc_control.dji import SetpointLimits, Switch
 from nmpc_control.mode_inputs import ModeParameters
-from nmpc_control.plan_check import PlanCheckParameters
+from nmpc_control.params import Disturbance
+from nmpc_control.stopping import StoppingParameters
+from nmpc_control.verdict import PlanCheckParameters
 
 
 def _positive() -> float:
@@ -32,6 +34,8 @@ class GuardParameters:
     modes: ModeParameters = field()
     plan_check: PlanCheckParameters = field()
     brake: BrakeParameters = field()
+    stopping: StoppingParameters = field()
+    disturbance: Disturbance = field()
 
 
 def load_guard_parameters(directory: Optional[Path] = None) -> GuardParameters:

@@ -185,8 +185,10 @@ def transcribe(structure: Structure, hard: bool) -> Dict[str, ca.SX]:
     u_before, theta = ca.SX.sym("u_before", NU), ca.SX.sym("theta", THETA_SIZE)
     stages = ca.SX.sym("stages", structure.stage_size, N + 1)
     slack = ca.SX.sym("slack", len(slack_kinds(structure, hard)), N + 1)
-    soft_weight = theta[PARTS["soft_weight"]]
-    cost = last(X[:, N], stages[:, N], theta) + soft_weight * ca.sum1(ca.vec(slack))
+    weight = {kind: theta[PARTS["soft_weight"]] for kind in (constraints.SPEED, constraints.FENCE)}
+    weight[constraints.OBSTACLE] = theta[PARTS["obstacle_weight"]]
+    weights = ca.vertcat(*[weight[kind] for kind in slack_kinds(structure, hard)])
+    cost = last(X[:, N], stages[:, N], theta) + ca.dot(weights, ca.sum2(slack))
     defects, changes, softened = [], [], []
     for k in range(N):
         before = U[:, k - 1] if k else u_before

@@ -7,6 +7,7 @@ from typing import Optional, Tuple
 import numpy as np
 
 from nmpc_control.params import Flight
+from nmpc_control.reference_clock import ReferenceClock
 from nmpc_control.state import NX, POSITION, VELOCITY, YAW, YAW_RATE, Goal
 from nmpc_control.trajectory import Trajectory, approach
 
@@ -30,17 +31,31 @@ class Itinerary:
         self.goal = Goal.HOLD
         self.outcome: Optional[Outcome] = None  # of the last goal; None while one is pursued
         self.trajectory: Optional[Trajectory] = None  # the one that is flown or approached
-        self.clock_start: Optional[float] = None  # [s] time at which the trajectory's clock began
+        self.clock_start: Optional[float] = None  # [s] time at which the trajectory began
         self._hold: Tuple[np.ndarray, float] = (np.zeros(3), 0.0)
         self._leg: Optional[Trajectory] = None
-        self._leg_start = 0.0
+        self._clock: Optional[ReferenceClock] = None
+        self._suspended: Optional[Goal] = None
+        self._held_since: Optional[float] = None
         self._settled_since: Optional[float] = None
 
     def hold(self, position: np.ndarray, yaw: float, message: str = "told to hold") -> None:
         """Hold a position (3,) [m] and yaw [rad]; a goal that was pursued ends without arrival."""
-        if self.goal is not Goal.HOLD:
+        if self.goal is not Goal.HOLD or self._suspended is not None:
             self._end(False, message)
         self._hold = (np.array(position, dtype=float), float(yaw))
+
+    def suspend(self, position: np.ndarray, yaw: float) -> None:
+        """Hold a position (3,) [m] and yaw [rad] for a while; the goal and its clock wait."""
+        if self.goal is not Goal.HOLD:
+            self._suspended, self.goal = self.goal, Goal.HOLD
+        self._hold = (np.array(position, dtype=float), float(yaw))
+
+    def resume(self, t: float) -> None:
+        """Go on at ``t`` [s] with the goal where it was suspended, if one was."""
+        if self._suspended is not None:
+            self.goal, self._suspended = self._suspended, None
+            self._clock.resume(t)
 
     def go_to(
         self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float
@@ -57,27 +72,44 @@ class Itinerary:
 
     def begin(self, t: float, trajectory: Trajectory) -> None:
         """Start the trajectory's clock at ``t`` [s] wherever the aircraft is."""
-        self.goal, self.outcome = Goal.TRAJECTORY, None
+        self.goal, self.outcome, self._suspended = Goal.TRAJECTORY, None, None
         self.trajectory, self.clock_start = trajectory, t
+        self._clock = ReferenceClock(trajectory, t, self.flight)
 
     def is_going_to(self, target: np.ndarray) -> bool:
         """Return whether a target (3,) [m] is what ``go_to`` is under way to."""
         on_leg = self.goal is Goal.APPROACH and self.trajectory is None
         return on_leg and bool(np.linalg.norm(self._target() - target) < 1e-3)
 
-    def update(self, t: float, position: np.ndarray, velocity: np.ndarray) -> None:
-        """Move on with the position (3,) [m] and velocity (3,) [m/s] at time ``t`` [s]."""
+    def update(
+        self, t: float, position: np.ndarray, velocity: np.ndarray, held_up: bool = False
+    ) -> None:
+        """Move on at time ``t`` [s].
+
+        Args:
+            t: [s] now.
+            position: (3,) [m] of the aircraft.
+            velocity: (3,) [m/s] of it.
+            held_up: whether obstacles keep it from going on; then time does not press.
+        """
         if self.goal is Goal.HOLD:
             return
-        target = self._target()
-        near = np.linalg.norm(position - target) < self.flight.arrival_distance
+        self._clock.advance(t, position)
+        if not held_up:
+            self._held_since = None
+        elif self._held_since is None:
+            self._held_since = t
+        elif t - self._held_since > self.flight.patience:
+            self._give_up(t, position, f"held up for {self.flight.patience:g} s")
+            return
+        near = np.linalg.norm(position - self._target()) < self.flight.arrival_distance
         at_rest = near and np.linalg.norm(velocity) < self.flight.arrival_speed
         if self.goal is Goal.APPROACH:
-            self._update_approach(t, position, bool(at_rest))
-        elif t >= self.clock_start + self.trajectory.duration:
+            self._update_approach(t, position, bool(at_rest), held_up)
+        elif self._clock.over >= 0.0:
             if at_rest:
                 self._finish("arrived")
-            elif t > self.clock_start + self.trajectory.duration + self.flight.arrival_timeout:
+            elif self._clock.over > self.flight.arrival_timeout and not held_up:
                 self._give_up(t, position, "the trajectory's time is over, its end was not reached")
 
     def reference(self, times: np.ndarray) -> np.ndarray:
@@ -86,35 +118,34 @@ class Itinerary:
         if self.goal is Goal.HOLD:
             x[:, POSITION], x[:, YAW] = self._hold
             return x
-        if self.goal is Goal.APPROACH:
-            sample = self._leg.sample(times - self._leg_start)
-        else:
-            sample = self.trajectory.sample(times - self.clock_start)
-        x[:, POSITION], x[:, VELOCITY] = sample.position, sample.velocity
-        x[:, YAW], x[:, YAW_RATE] = sample.yaw, sample.yaw_rate
+        sample, pace = self._path.sample(self._clock.read(times)), max(1.0, self._clock.rate)
+        x[:, POSITION], x[:, VELOCITY] = sample.position, pace * sample.velocity
+        x[:, YAW], x[:, YAW_RATE] = sample.yaw, pace * sample.yaw_rate
         return x
 
     def reference_time(self, t: float) -> float:
         """Return the clock of the trajectory [s] at ``t``; NaN while none is flown."""
-        return t - self.clock_start if self.goal is Goal.TRAJECTORY else float("nan")
+        if self.goal is not Goal.TRAJECTORY:
+            return float("nan")
+        return float(self._clock.read(np.array(t)))
 
     def progress(self, t: float) -> float:
         """Return the part 0..1 of the trajectory's time that has passed at ``t`` [s]."""
         if self.goal is not Goal.TRAJECTORY:
             return 0.0
         return float(
-            np.clip((t - self.clock_start) / max(self.trajectory.duration, 1e-9), 0.0, 1.0)
+            np.clip(self.reference_time(t) / max(self.trajectory.duration, 1e-9), 0.0, 1.0)
         )
+
+    @property
+    def _path(self) -> Trajectory:
+        return self._leg if self.goal is Goal.APPROACH else self.trajectory
 
     def _set_out(
         self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float
     ) -> None:
-        self.goal, self.outcome, self.clock_start, self._settled_since = (
-            Goal.APPROACH,
-            None,
-            None,
-            None,
-        )
+        self.goal, self.outcome, self._suspended = Goal.APPROACH, None, None
+        self.clock_start, self._settled_since = None, None
         self._leg = approach(
             position,
             target,
@@ -123,17 +154,17 @@ class Itinerary:
             yaw,
             target_yaw,
         )
-        self._leg_start = t
+        self._clock = ReferenceClock(self._leg, t, self.flight)
 
     def _target(self) -> np.ndarray:
-        path = self._leg if self.goal is Goal.APPROACH else self.trajectory
-        return path.sample(np.array([path.duration])).position[0]
+        return self._path.end
 
-    def _update_approach(self, t: float, position: np.ndarray, at_rest: bool) -> None:
-        leg_end = self._leg_start + self._leg.duration
-        if not at_rest or t < leg_end:
+    def _update_approach(
+        self, t: float, position: np.ndarray, at_rest: bool, held_up: bool
+    ) -> None:
+        if not at_rest or self._clock.over < 0.0:
             self._settled_since = None
-            if t > leg_end + self.flight.arrival_timeout:
+            if self._clock.over > self.flight.arrival_timeout and not held_up:
                 self._give_up(t, position, "the start was not reached in time")
             return
         self._settled_since = t if self._settled_since is None else self._settled_since
@@ -145,8 +176,7 @@ class Itinerary:
             self.begin(t, self.trajectory)
 
     def _finish(self, message: str) -> None:
-        path = self._leg if self.goal is Goal.APPROACH else self.trajectory
-        last = path.sample(np.array([path.duration]))
+        last = self._path.sample(np.array([self._path.duration]))
         self._hold = (last.position[0], float(last.yaw[0]))
         self._end(True, message)
 
@@ -158,4 +188,5 @@ class Itinerary:
 
     def _end(self, arrived: bool, message: str) -> None:
         self.goal, self.outcome = Goal.HOLD, Outcome(arrived, message)
-        self._leg, self.clock_start = None, None
+        self._leg, self._clock, self.clock_start, self._held_since = None, None, None, None
+        self._suspended = None

@@ -2,21 +2,20 @@
 """The upper rungs of the ladder: which verified plan is flown now, if any, and why not."""
 
 import math
+from dataclasses import replace
 from enum import IntEnum
-from typing import Optional, Sequence, Tuple
+from typing import Callable, Optional, Sequence, Tuple
 
 import numpy as np
 
-from nmpc_control.obstacle import Obstacle
+from nmpc_control.clearance_check import Obstacles
 from nmpc_control.params import Limits, Vehicle
-from nmpc_control.plan_check import (
-    Finding,
-    PlanCheckParameters,
-    Verdict,
-    check_flown,
-    check_plan,
-)
+from nmpc_control.plan_check import check_flown, check_plan
 from nmpc_control.state import Goal, Plan
+from nmpc_control.verdict import NOT_INSIDE, Finding, PlanCheckParameters, Verdict
+
+# [m] a plan that is too near must keep this much farther off than the brake to be flown instead
+ADVANTAGE = 0.1
 
 
 class Rung(IntEnum):
@@ -31,7 +30,7 @@ class Rung(IntEnum):
 
 
 class PlanLadder:
-    """The last verified plan, and for how long plans have been usable."""
+    """The last verified plan, for how long plans have been usable, and where it became too near."""
 
     def __init__(
         self, params: PlanCheckParameters, hold_timeout: float, vehicle: Vehicle, limits: Limits
@@ -55,10 +54,13 @@ class PlanLadder:
     def forget(self) -> None:
         """Drop everything that carries a time; the counts remain."""
         self.plan: Optional[Plan] = None
-        self._flown: Optional[Plan] = None  # with the states to which its inputs really lead
+        self.flown: Optional[Plan] = None  # with the states to which its inputs really lead
         self.goal = Goal.HOLD
         self.verified = 0  # [1] in a row
         self._verdict = Verdict(Finding.NOT_FOUND, "no plan has come")
+        self._inside = NOT_INSIDE
+        self._came = -math.inf  # [s] the newest plan, verified or not
+        self._evades = False  # on a plan that is too near, because braking is worse
         self._is_new = False
         self._usable_since: Optional[float] = None
         self._hold_since: Optional[float] = None
@@ -71,10 +73,25 @@ class PlanLadder:
         t: float,
         state: Optional[np.ndarray],
         inputs: Sequence[Tuple[float, Sequence[float]]],
-        obstacles: Sequence[Obstacle],
+        obstacles: Obstacles,
+        brake_clearance: Callable[[], float] = lambda: math.inf,
     ) -> None:
-        """Check a plan that has just come; as ``check_plan``, with state None where unknown."""
+        """Check a plan that has just come.
+
+        Refusing it for an obstacle means to brake, so one that is too near is flown all the same
+        where the brake would come nearer still: who is met by something fast must not stand still.
+
+        Args:
+            plan: what the solver offers.
+            goal: what it serves.
+            t: [s] now.
+            state: (10,) at ``t``, None where unknown.
+            inputs: as of ``check_plan``.
+            obstacles: as known now.
+            brake_clearance: how near [m] a brake begun now comes to an obstacle.
+        """
         self.received += 1
+        self._came = t
         if state is None:
             self._verdict = Verdict(Finding.JUMP, "the state is not known")
         else:
@@ -87,13 +104,17 @@ class PlanLadder:
                 limits=self.limits,
                 obstacles=obstacles,
                 params=self.params,
+                before=self._inside,
             )
+            self._verdict = self._lesser_evil(self._verdict, brake_clearance)
+        if self._verdict.inside is not None:
+            self._inside = self._verdict.inside.since(self._inside)
         if not self._verdict.ok:
             self.rejected += 1
             self.verified = 0
             return
         self.plan, self.goal, self._is_new = plan, goal, True
-        self._flown = self._verdict.flown or plan
+        self.flown = self._verdict.flown or plan
         self.verified += 1
         if goal is Goal.HOLD:
             self._hold_since = None
@@ -113,15 +134,27 @@ class PlanLadder:
         """Accept every goal again."""
         self._hold_since = None
 
-    def assess(self, t: float, obstacles: Sequence[Obstacle]) -> Tuple[Rung, Verdict]:
-        """Return the rung at ``t`` [s], NONE without a usable plan, and the verdict behind it."""
-        rung, verdict = self._assess(t, obstacles)
+    def assess(
+        self,
+        t: float,
+        obstacles: Obstacles,
+        brake_clearance: Callable[[], float] = lambda: math.inf,
+    ) -> Tuple[Rung, Verdict]:
+        """Return the rung at ``t`` [s], NONE without a usable plan, and the verdict behind it.
+
+        Arguments as of ``take``.
+        """
+        rung, verdict = self._assess(t, obstacles, brake_clearance)
         if rung is Rung.NONE:
             self._usable_since = None
         elif self._usable_since is None:
             self._usable_since = t
         self._is_new = False
         return rung, verdict
+
+    def is_blocked(self, t: float) -> bool:
+        """Return whether plans come, and the newest one was refused for obstacles alone."""
+        return self._verdict.is_near and t - self._came <= self.params.timeout
 
     def usable_time(self, t: float) -> float:
         """Return for how long [s] plans have been usable without interruption."""
@@ -131,7 +164,9 @@ class PlanLadder:
         """Return the age [s] of the last verified plan; inf without."""
         return math.inf if self.plan is None else t - self.plan.t
 
-    def _assess(self, t: float, obstacles: Sequence[Obstacle]) -> Tuple[Rung, Verdict]:
+    def _assess(
+        self, t: float, obstacles: Obstacles, brake_clearance: Callable[[], float]
+    ) -> Tuple[Rung, Verdict]:
         if self.plan is None:
             return Rung.NONE, self._verdict
         if self._is_new:
@@ -139,8 +174,14 @@ class PlanLadder:
         else:
             rung = Rung.LAST_PLAN
             verdict = check_flown(
-                self._flown, t=t, vehicle=self.vehicle, obstacles=obstacles, params=self.params
+                self.flown,
+                t=t,
+                vehicle=self.vehicle,
+                obstacles=obstacles,
+                params=self.params,
+                before=self._inside,
             )
+            verdict = self._lesser_evil(verdict, brake_clearance)
         if not verdict.ok:
             self.verified = 0
             return Rung.NONE, self._with_rejection(verdict)
@@ -154,4 +195,17 @@ class PlanLadder:
         if self._verdict.ok:
             return verdict
         sentence = f"{self._verdict.sentence}, and {verdict.sentence}"
-        return Verdict(self._verdict.finding, sentence, verdict.clearance)
+        return replace(verdict, finding=self._verdict.finding, sentence=sentence)
+
+    def _lesser_evil(self, verdict: Verdict, brake_clearance: Callable[[], float]) -> Verdict:
+        """Return the verdict on a plan that is too near, seeing what braking would do instead."""
+        if not verdict.is_near or not math.isfinite(verdict.nearest):
+            self._evades = False
+            return verdict
+        clearance = brake_clearance()
+        gain = verdict.nearest - clearance
+        self._evades = gain > (-ADVANTAGE if self._evades else ADVANTAGE)
+        if not self._evades:
+            return verdict
+        sentence = f"{verdict.sentence}, but braking would come to {clearance:.2f} m"
+        return replace(verdict, finding=Finding.OK, sentence=sentence)

@@ -16,8 +16,6 @@ paper's k / tau is ``1 / time_constant`` here. ``d`` is a constant acceleration 
 not know.
 """
 
-from typing import Optional
-
 import casadi as ca
 import numpy as np
 
@@ -25,29 +23,24 @@ from nmpc_control.params import Vehicle
 from nmpc_control.state import GRAVITY, NU, NX
 
 INTEGRATORS = ("exact_lag", "rk4", "euler")
+DISTURBANCE = slice(10, 13)  # of the model parameters
 MODEL_SIZE = 13
 # Gauss-Legendre on [0, 1], exact for polynomials of degree five
 _NODES = np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)])
 _NODE_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 
-def model_parameters(vehicle: Vehicle, disturbance: Optional[np.ndarray] = None) -> np.ndarray:
+def model_parameters(vehicle: Vehicle) -> np.ndarray:
     """Return the model's run-time parameters (13,).
 
-    Args:
-        vehicle: lags, gains and drag.
-        disturbance: (3,) constant acceleration in the world frame [m/s^2].
-
-    Returns:
-        Rates 1/tau [1/s] and gains [1] of roll, pitch, yaw rate; drag (3) [1/s]; gravity;
-        disturbance (3).
+    Rates 1/tau [1/s] and gains [1] of roll, pitch, yaw rate; drag (3) [1/s]; gravity; disturbance
+    (3), a constant acceleration in the world frame [m/s^2].
     """
-    d = np.zeros(3) if disturbance is None else disturbance
     lags = [
         (1.0 / lag.time_constant, lag.gain)
         for lag in (vehicle.roll, vehicle.pitch, vehicle.yaw_rate)
     ]
-    return np.concatenate([np.ravel(lags), vehicle.drag, [GRAVITY], d])
+    return np.concatenate([np.ravel(lags), vehicle.drag, [GRAVITY], vehicle.disturbance])
 
 
 def continuous(x: ca.SX, u: ca.SX, p: ca.SX) -> ca.SX:

@@ -2,19 +2,26 @@
 """The controller's optimiser: poses the problem of ``ocp``, keeps the warm start, returns plans."""
 
 from dataclasses import replace
-from typing import Optional, Sequence, Union
+from typing import Optional, Sequence, Tuple, Union
 
 import numpy as np
 
+from nmpc_control import constraints
 from nmpc_control.ipopt import IpoptSolver
+from nmpc_control.model import DISTURBANCE
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.ocp import Instance, Structure
-from nmpc_control.packing import check_arguments, pack_stages, pack_theta
+from nmpc_control.ocp import PARTS, Structure
+from nmpc_control.other_ways import OtherWays, Posed
+from nmpc_control.packing import check_arguments, pack_theta
 from nmpc_control.params import Parameters
-from nmpc_control.slots import Slots, clearance
+from nmpc_control.slots import Slots
 from nmpc_control.solution import Guess, Solution, shift
 from nmpc_control.sqp import SqpSolver
-from nmpc_control.state import GRAVITY, Plan, hover_input
+from nmpc_control.state import GRAVITY, POSITION, VELOCITY, Plan, hover_input
+
+_SOON = 2.0  # [s] ahead in which a plan that goes on makes headway
+_NO_HEADWAY = 0.3  # [m], [m/s]
+_NAMED = 3  # obstacles in a sentence
 
 
 class Nmpc:
@@ -26,14 +33,16 @@ class Nmpc:
         self.structure = Structure(p.horizon, p.dt, p.integrator, p.obstacle_slots)
         budget = (p.budget.tolerance, p.budget.max_iterations, p.budget.time_budget)
         self.solver: Union[SqpSolver, IpoptSolver] = (
-            SqpSolver(self.structure, *budget)
+            SqpSolver(self.structure, *budget, p.budget.warm_iterations)
             if p.backend == "compiled"
             else IpoptSolver(self.structure, *budget, linear_solver=p.linear_solver)
         )
         self._last: Optional[Solution] = None
         self._last_t = 0.0
-        self._obstacle_slots = Slots()
-        self._disturbance = np.zeros(3)
+        self._slots = Slots(p.obstacle_slots)
+        self._other_ways = OtherWays(parameters.avoidance.guides, shooting=p.backend == "compiled")
+        self.held_up_by: Tuple[str, ...] = ()  # obstacles before which the last plan waits
+        self.tracking_error = 0.0  # [m] by which plans have been missed lately; raises the margin
         self._theta = self._pack_theta(parameters)
 
     def use(self, parameters: Parameters) -> None:
@@ -47,6 +56,16 @@ class Nmpc:
         parameters = replace(parameters, solver=self.parameters.solver)
         self._theta = self._pack_theta(parameters)
         self.parameters = parameters
+
+    def expect(self, disturbance: np.ndarray, tracking_error: float = 0.0) -> None:
+        """Take what was learnt in flight into the problem.
+
+        Args:
+            disturbance: (3,) [m/s^2] constant acceleration in the world frame.
+            tracking_error: [m] by which plans are missed; added to the margin of Eq. 7.
+        """
+        self.tracking_error = tracking_error
+        self._theta[PARTS["model"]][DISTURBANCE] = disturbance
 
     def reset(self) -> None:
         """Forget the last solution: the next solve starts from hover."""
@@ -80,14 +99,53 @@ class Nmpc:
             ProblemError: a wrong shape; a time, reference or obstacle that is not finite.
         """
         check_arguments(t, x0, x_ref, u_before, u_ref, self.structure.horizon)
-        guess = self._guess(t)
-        slots = self._slots(t, obstacles, x_ref[:, :3] if guess is None else guess.states[:, :3])
-        stages = pack_stages(
-            self.structure, x_ref, hover_input(GRAVITY) if u_ref is None else u_ref, slots
-        )
-        solution = self.solver.solve(Instance(x0, u_before, stages, self._theta), guess)
+        problem = self._pose(t, x0, x_ref, u_before, obstacles, u_ref)
+        guess, reference = self._guess(t), x_ref[:, POSITION]
+        path = reference if guess is None else guess.states[:, POSITION]
+        instance = problem.instance(self._slots, [path, reference])
+        if guess is not None and guess.multipliers is not None:
+            guess.multipliers[:, [constraints.PILOT_BOUNDS + i for i in self._slots.renewed]] = 0.0
+        solution = self.solver.solve(instance, guess)
+        self.held_up_by = ()
+        if problem.obstacles:
+            choice = self._other_ways.improve(
+                self.solver, problem, solution, self._slots, warm=guess is not None
+            )
+            solution, self._slots = choice.solution, choice.slots
+            self.held_up_by = self._holding(problem, solution, choice.blocked)
         self._last, self._last_t = (solution, t) if solution.found else (None, 0.0)
-        return self.as_plan(t, solution, self._exceeded(solution, x0, slots))
+        return self.as_plan(t, solution, self._remark(solution, problem))
+
+    def _pose(
+        self,
+        t: float,
+        x0: np.ndarray,
+        x_ref: np.ndarray,
+        u_before: np.ndarray,
+        obstacles: Sequence[Obstacle],
+        u_ref: Optional[np.ndarray],
+    ) -> Posed:
+        """Return the problem without choice of slots; arguments as of ``solve``."""
+        avoidance = self.parameters.avoidance
+        margin, paper = self.parameters.vehicle.radius + avoidance.safety_distance, False
+        if avoidance.term == "potential":
+            reach, paper = avoidance.inflation, True  # Eq. 8 is taken as it stands
+        else:
+            reach = avoidance.cushion if avoidance.term == "barrier" else 0.0
+            margin += avoidance.allowance + self.tracking_error
+        return Posed(
+            structure=self.structure,
+            times=self.stage_times(t),
+            x0=x0,
+            u_before=u_before,
+            x_ref=x_ref,
+            u_ref=hover_input(GRAVITY) if u_ref is None else u_ref,
+            theta=self._theta,
+            obstacles=obstacles if avoidance.enabled else (),
+            margin=margin,
+            reach=reach,
+            between=not paper,
+        )
 
     def as_plan(self, t: float, solution: Solution, remark: str = "") -> Plan:
         """Return a solution as plan of time ``t`` [s], its status with a remark."""
@@ -106,19 +164,34 @@ class Nmpc:
         )
 
     def _pack_theta(self, p: Parameters) -> np.ndarray:
-        return pack_theta(p.vehicle, p.weights, p.limits, p.avoidance, self._disturbance)
+        return pack_theta(p.vehicle, p.weights, p.limits, p.avoidance)
 
-    def _exceeded(self, solution: Solution, x0: np.ndarray, slots: np.ndarray) -> str:
+    def _remark(self, solution: Solution, problem: Posed) -> str:
         """Return which softened bound the plan exceeds, or into which margin it begins; or ""."""
         if solution.softened:
             return f", {solution.softened} exceeded by {solution.violation:.2f}"
-        if self._obstacle_slots.left_out:
-            return f", {self._obstacle_slots.left_out} obstacles in reach have no slot"
-        avoidance = self.parameters.avoidance
-        inside = -clearance(slots[:, 0], x0[:3]).min(initial=np.inf) - avoidance.inflation
-        if avoidance.term == "potential" and inside > 0.0:
+        if self.held_up_by:
+            return f", held up by {', '.join(self.held_up_by)}"
+        if self._slots.left_out:
+            return f", {self._slots.left_out} obstacles in reach have no slot"
+        now = self._slots.field.distances(problem.x0[None, POSITION], problem.times[:1])
+        inside = problem.margin - now.min(initial=np.inf)
+        if inside > 0.0 and problem.obstacles:
             return f", obstacle margin entered by {inside:.2f}"
         return ""
+
+    def _holding(self, problem: Posed, solution: Solution, blocked: np.ndarray) -> Tuple[str, ...]:
+        """Return the ids of the obstacles before which a plan waits, nearest first, or ()."""
+        soon = min(int(_SOON / self.structure.dt), self.structure.horizon)
+        here = problem.x0[POSITION]
+        moves = np.linalg.norm(solution.states[soon, POSITION] - here) > _NO_HEADWAY
+        moves |= np.linalg.norm(problem.x0[VELOCITY]) > _NO_HEADWAY
+        arrived = np.linalg.norm(problem.x_ref[-1, POSITION] - here) < _NO_HEADWAY
+        if moves or arrived or not blocked.any():
+            return ()
+        distances = self._slots.field.distances(here[None], problem.times[:1])[:, 0]
+        nearest = np.argsort(np.where(blocked, distances, np.inf), kind="stable")
+        return tuple(self._slots.field.ids[i] for i in nearest[: min(_NAMED, blocked.sum())])
 
     def _guess(self, t: float) -> Optional[Guess]:
         if self._last is None:
@@ -127,14 +200,3 @@ class Nmpc:
         if not 0.0 <= stages < self.structure.horizon / 2:
             return None
         return shift(self._last.guess, stages)
-
-    def _slots(self, t: float, obstacles: Sequence[Obstacle], path: np.ndarray) -> np.ndarray:
-        """Return the slot data of the obstacles nearest to the path (N + 1, 3)."""
-        avoidance = self.parameters.avoidance
-        if not avoidance.enabled:
-            obstacles = ()
-        margin = self.parameters.vehicle.radius + avoidance.safety_distance
-        if avoidance.term == "potential":
-            margin += avoidance.inflation  # it acts only inside its reach
-        slots = self.structure.obstacle_slots
-        return self._obstacle_slots.fill(obstacles, self.stage_times(t), path, margin, slots)

@@ -46,6 +46,10 @@ class ObstacleField:
         """Return the number of obstacles n."""
         return len(self.ids)
 
+    def part(self, which: np.ndarray) -> "ObstacleField":
+        """Return some of them, by their indices (k,), in that order."""
+        return ObstacleField([self.obstacles[i] for i in which])
+
     @property
     def unusable(self) -> Tuple[str, ...]:
         """Ids of those that are nowhere, or have no size."""

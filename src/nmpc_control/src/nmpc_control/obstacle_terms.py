@@ -31,9 +31,9 @@ def value(structure: Structure) -> ca.Function:
     """Return (x, stage, theta, multipliers) -> potentials and penalties (2,)."""
 
     def terms(p: ca.SX, slots: List[ca.SX], theta: ca.SX, multipliers: ca.SX) -> List[ca.SX]:
-        eta, rho, hard, inverse_mu = _parts(theta)
+        eta, cushion, rho, hard, inverse_mu = _parts(theta)
         d = [distance(p, slot) for slot in slots]
-        total = sum(potential(d_i, slot, eta) for d_i, slot in zip(d, slots))
+        total = sum(potential(d_i, slot, eta, cushion) for d_i, slot in zip(d, slots))
         return [
             ca.vertcat(total, ca.sum1(penalty(_g(d, slots, hard), multipliers, inverse_mu, rho)))
         ]
@@ -45,7 +45,7 @@ def settle(structure: Structure) -> ca.Function:
     """Return (x, stage, theta, multipliers) -> sums, maxima, new multipliers of the slots."""
 
     def terms(p: ca.SX, slots: List[ca.SX], theta: ca.SX, multipliers: ca.SX) -> List[ca.SX]:
-        _, rho, hard, inverse_mu = _parts(theta)
+        _, _, rho, hard, inverse_mu = _parts(theta)
         g = _g([distance(p, slot) for slot in slots], slots, hard)
         result = augmented.settled(g, multipliers, inverse_mu, rho)
         maxima = ca.vertcat(result.moved, 0, 0, ca.fmax(0, ca.mmax(g)))
@@ -62,11 +62,11 @@ def derivatives(structure: Structure, exact: bool) -> ca.Function:
     """
 
     def terms(p: ca.SX, slots: List[ca.SX], theta: ca.SX, multipliers: ca.SX) -> List[ca.SX]:
-        eta, rho, hard, inverse_mu = _parts(theta)
+        eta, cushion, rho, hard, inverse_mu = _parts(theta)
         gradient, H, d = ca.SX.zeros(3), ca.SX.zeros(3, 3), ca.SX.sym("d")
         for i, slot in enumerate(slots):
             g = constraints.obstacle(d, slot, hard)
-            cost = potential(d, slot, eta) + penalty(g, multipliers[i], inverse_mu, rho)
+            cost = potential(d, slot, eta, cushion) + penalty(g, multipliers[i], inverse_mu, rho)
             here = distance(p, slot)
             curvature, force = ca.substitute([*ca.hessian(cost, d)], [d], [here])
             H_d, n = ca.hessian(here, p)
@@ -83,9 +83,10 @@ def _g(d: List[ca.SX], slots: List[ca.SX], hard: ca.SX) -> ca.SX:
 
 
 def _parts(theta: ca.SX) -> Sequence[ca.SX]:
-    """Return eta, rho, whether Eq. 7 is selected, and 1 / mu."""
-    parts = [theta[PARTS[name]] for name in ("eta", "soft_weight", "hard_obstacles", "stiffness")]
-    return [*parts[:3], 1 / (_MU * parts[3])]
+    """Return eta, cushion, rho, whether Eq. 7 is selected, and 1 / mu."""
+    names = ("eta", "cushion", "obstacle_weight", "hard_obstacles", "stiffness")
+    parts = [theta[PARTS[name]] for name in names]
+    return [*parts[:4], 1 / (_MU * parts[4])]
 
 
 def _in_blocks(
@@ -100,7 +101,7 @@ def _in_blocks(
     results = []
     for block, force in zip(blocks, forces):
         reach, evaluate = _block(name, terms, force.numel())
-        results.append(evaluate.call([reach(x, block, force), x, block, theta, force]))
+        results.append(evaluate.call([reach(x, block, theta, force), x, block, theta, force]))
     rules = {"sum": sum, "max": _largest, "stack": lambda parts: ca.vertcat(*parts)}
     outputs = [rules[rule](parts) for rule, parts in zip(combine, zip(*results))]
     return ca.Function(name, [x, stage, theta, multipliers], outputs)
@@ -111,12 +112,14 @@ def _block(name: str, terms: Terms, size: int) -> Sequence[ca.Function]:
     x, theta = ca.SX.sym("x", NX), ca.SX.sym("theta", THETA_SIZE)
     data, multipliers = ca.SX.sym("slots", SLOT_SIZE * size), ca.SX.sym("l", size)
     slots = ca.vertsplit(data, SLOT_SIZE)
-    inside = [  # d < D + l / mu (with its least mu) without root and division
-        squared_distance(x[:3], slot) * slot[4] ** 2 < (1 + multipliers[i] * (slot[4] / _MU)) ** 2
+    cushion = theta[PARTS["cushion"]]
+    inside = [  # d < D + cushion or l / mu (with its least mu) without root and division
+        squared_distance(x[:3], slot) * slot[4] ** 2
+        < (1 + slot[4] * ca.fmax(cushion, multipliers[i] / _MU)) ** 2
         for i, slot in enumerate(slots)
     ]
-    reach = ca.Function(f"{name}_reach", [x, data, multipliers], [ca.mmax(ca.vertcat(*inside))])
     arguments = [x, data, theta, multipliers]
+    reach = ca.Function(f"{name}_reach", arguments, [ca.mmax(ca.vertcat(*inside))])
     outputs = [ca.densify(v) for v in terms(x[:3], slots, theta, multipliers)]
     near = ca.Function(f"{name}_near", arguments, outputs)
     far = ca.Function(f"{name}_far", arguments, [ca.SX.zeros(v.shape) for v in outputs])

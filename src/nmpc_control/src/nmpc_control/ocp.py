@@ -36,11 +36,13 @@ _SIZES = {
     "u_min": NU,
     "u_max": NU,
     "eta": 1,
+    "cushion": 1,  # [m] the potential begins this much before the margin D
     "speed": 1,  # [m/s]
     "fence_min": 3,  # [m]
     "fence_max": 3,  # [m]
     "input_rate": NU,  # [input unit per s]
-    "soft_weight": 1,  # rho of the L1 penalty
+    "soft_weight": 1,  # rho of the L1 penalty on speed [s/m] and fence [1/m]
+    "obstacle_weight": 1,  # [1/m] the same on Eq. 7
     "hard_obstacles": 1,  # 1: Eq. 7 holds as an inequality; 0: it does not
     "stiffness": 1,  # factor on the curvatures of the compiled solver's augmented Lagrangian
 }
@@ -100,11 +102,6 @@ class Instance:
         """Upper input bounds (4,)."""
         return self.theta[PARTS["u_max"]]
 
-    @property
-    def soft_weight(self) -> float:
-        """Weight rho of the L1 penalty on the softened inequalities."""
-        return float(self.theta[PARTS["soft_weight"]][0])
-
 
 class Symbols:
     """Symbols of one stage and the parameter vector split into its parts."""
@@ -139,9 +136,12 @@ def tracking_residuals(s: Symbols, terminal: bool) -> Tuple[ca.SX, ca.SX]:
     )
 
 
-def potential(d: ca.SX, slot: ca.SX, eta: ca.SX) -> ca.SX:
-    """Return U_i (Eq. 8) at a distance d [m] from the centre of the obstacle in a slot (5,)."""
-    return eta / 2 * ca.fmax(0, 1 / d - slot[4]) ** 2
+def potential(d: ca.SX, slot: ca.SX, eta: ca.SX, cushion: ca.SX) -> ca.SX:
+    """Return U_i (Eq. 8) at a distance d [m] from the centre of the obstacle in a slot (5,).
+
+    It begins a cushion [m] before the slot's own distance.
+    """
+    return eta / 2 * ca.fmax(0, 1 / d - slot[4] / (1 + cushion * slot[4])) ** 2
 
 
 def input_bounds(structure: Structure, s: Symbols) -> Tuple[ca.SX, ca.SX]:
@@ -165,11 +165,20 @@ def inequalities(structure: Structure, s: Symbols) -> ca.SX:
     return ca.vertcat(constraints.pilot_bounds(s.x[:3], s.x[6:9], s.bounds), *obstacles)
 
 
+def penalty_weights(structure: Structure, s: Symbols) -> ca.SX:
+    """Return the weights of the L1 penalty on each of ``inequalities``."""
+    weight = {kind: s.bounds["soft_weight"] for kind in (constraints.SPEED, constraints.FENCE)}
+    weight[constraints.OBSTACLE] = s.bounds["obstacle_weight"]
+    return ca.vertcat(*[weight[kind] for kind in constraints.rows(structure.obstacle_slots)])
+
+
 def stage_cost(structure: Structure, s: Symbols, terminal: bool) -> ca.SX:
     """Return the cost of one stage (Eqs. 5, 8, 9) without the penalty on the inequalities."""
     r, w = tracking_residuals(s, terminal)
     slots = split_slots(structure, s.stage)
-    return ca.dot(w, r * r) + sum(potential(distance(s.x[:3], i), i, s.eta) for i in slots)
+    return ca.dot(w, r * r) + sum(
+        potential(distance(s.x[:3], i), i, s.eta, s.bounds["cushion"]) for i in slots
+    )
 
 
 def split_slots(structure: Structure, stage: ca.SX) -> Sequence[ca.SX]:

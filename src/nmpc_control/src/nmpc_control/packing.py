@@ -17,36 +17,36 @@ def pack_theta(
     weights: Weights,
     limits: Limits,
     avoidance: Avoidance,
-    disturbance: np.ndarray,
 ) -> np.ndarray:
     """Return the parameter vector (THETA_SIZE,) shared by all stages.
 
     Raises ProblemError on unusable numbers.
     """
     _check_numbers(vehicle, weights, limits, avoidance)
-    potential, hard = (
-        avoidance.enabled and avoidance.term == "potential",
-        avoidance.enabled and avoidance.term == "hard",
-    )
+    eta, begins = {
+        "potential": (avoidance.eta, avoidance.inflation),
+        "barrier": (avoidance.cushion_gain, avoidance.cushion),
+    }.get(avoidance.term, (0.0, 0.0))
+    hard = avoidance.enabled and avoidance.term != "potential"
     theta = np.concatenate(
         [
-            model_parameters(vehicle, disturbance),
+            model_parameters(vehicle),
             weights.Q,
             weights.Q_f,
             weights.R,
             weights.R_delta,
             limits.input_min,
             limits.input_max,
-            [avoidance.eta if potential else 0.0, limits.speed],
+            [eta if avoidance.enabled else 0.0, begins, limits.speed],
             limits.fence_min,
             limits.fence_max,
             limits.input_rate,
-            [limits.soft_weight, float(hard), 1.0],
+            [limits.soft_weight, avoidance.weight, float(hard), 1.0],
         ]
     )
     if not np.all(np.isfinite(theta)):
         raise ProblemError("parameters: got a value that is not finite")
-    for name in ("Q", "Q_f", "R", "R_delta", "eta", "soft_weight", "input_rate"):
+    for name in ("Q", "Q_f", "R", "R_delta", "eta", "soft_weight", "obstacle_weight", "input_rate"):
         if np.any(theta[PARTS[name]] < 0):
             raise ProblemError(f"{name}: got {theta[PARTS[name]]}, expected no negative value")
     for low, high in (("u_min", "u_max"), ("fence_min", "fence_max")):
@@ -74,6 +74,7 @@ def _check_numbers(
         ("fence_min", limits.fence_min, 3),
         ("fence_max", limits.fence_max, 3),
         ("drag", vehicle.drag, 3),
+        ("disturbance", vehicle.disturbance, 3),
     ):
         if np.shape(vector) != (length,):
             raise ProblemError(f"{name}: got shape {np.shape(vector)}, expected {(length,)}")
@@ -85,6 +86,8 @@ def _check_numbers(
         ("radius", vehicle.radius),
         ("safety_distance", avoidance.safety_distance),
         ("inflation", avoidance.inflation),
+        ("cushion", avoidance.cushion),
+        ("allowance", avoidance.allowance),
     ):
         if not 0 <= value < np.inf:
             raise ProblemError(f"{name}: got {value}, expected a length")

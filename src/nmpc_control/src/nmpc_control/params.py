@@ -76,6 +76,9 @@ class Vehicle:
         _positive()
     )  # [rad] the flight controller's own limit of the tilt vector's norm
     thrust_map: ThrustMap = field()
+    disturbance: np.ndarray = field(  # (3,) [m/s^2] constant acceleration in the world frame
+        default_factory=lambda: np.zeros(3), metadata={"length": 3}
+    )
 
 
 @dataclass(frozen=True)
@@ -120,15 +123,20 @@ class Limits:
 
 @dataclass(frozen=True)
 class Avoidance:
-    """Repulsive potential of Eq. 8, with the distance counted from the hull."""
+    """How obstacles enter the problem; distances are counted from the hull."""
 
     enabled: bool = field()
     term: str = field(
-        metadata={"choices": ("potential", "hard")}
-    )  # Eq. 8 in the cost, or Eq. 7 softened exactly
-    eta: float = _non_negative()  # gain of the potential
+        metadata={"choices": ("potential", "hard", "barrier")}
+    )  # Eq. 8 in the cost; Eq. 7 softened exactly; that, and a potential that begins before it
+    eta: float = _non_negative()  # gain of the potential where it is the term
     safety_distance: float = _non_negative()  # [m] hull to surface
-    inflation: float = _non_negative()  # [m] added to the distance at which the potential begins
+    inflation: float = _non_negative()  # [m] before the margin where the potential begins
+    cushion: float = _non_negative()  # [m] the same of the barrier
+    cushion_gain: float = _non_negative()  # of the barrier's potential
+    weight: float = _positive()  # [1/m] of the L1 penalty on Eq. 7
+    guides: int = field(metadata={"min": 0, "max": 8})  # other ways round tried in one tick
+    allowance: float = _non_negative()  # [m] added to the margin of Eq. 7: least tracking error
 
 
 @dataclass(frozen=True)
@@ -137,6 +145,7 @@ class Budget:
 
     rate: float = _positive()  # [Hz] solves per second
     max_iterations: int = field(metadata={"min": 1, "max": 1000})
+    warm_iterations: int = field(metadata={"min": 1, "max": 1000})  # the same from the last plan
     time_budget: float = _positive()  # [s] wall time for one solve
     tolerance: float = _positive()  # [1] see the solver's
 
@@ -176,7 +185,19 @@ class Flight:
         _non_negative()
     )  # [s] at rest at the start before the trajectory's clock runs
     arrival_timeout: float = _positive()  # [s] after the end of the trajectory's time
+    wait_lag: float = _positive()  # [s] behind the reference from which on it slows down to wait
+    catch_up: float = _non_negative()  # [1] faster than its own pace after it has waited
+    patience: float = _positive()  # [s] held up by obstacles after which a goal is given up
     state_timeout: float = _positive()  # [s] a state older than this is not flown on
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """How fast a constant disturbance is learnt and how large it may be."""
+
+    time_constant: float = field(metadata={"min": 0.05})  # [s]
+    horizontal: float = _non_negative()  # [m/s^2] largest on an axis; 0: none
+    vertical: float = _non_negative()  # [m/s^2] the same upward and downward
 
 
 @dataclass(frozen=True)
@@ -189,6 +210,7 @@ class Parameters:
     avoidance: Avoidance
     solver: Solver
     flight: Flight
+    disturbance: Disturbance
 
 
 def load_vehicle(name: str, directory: Optional[Path] = None) -> Vehicle:
@@ -221,7 +243,10 @@ class _File:
     avoidance: Avoidance
     solver: Solver
     flight: Flight
+    disturbance: Disturbance
 
     def with_presets(self, vehicle: Vehicle, weights: Weights) -> Parameters:
         limits = self.limits.within(vehicle)
-        return Parameters(vehicle, weights, limits, self.avoidance, self.solver, self.flight)
+        return Parameters(
+            vehicle, weights, limits, self.avoidance, self.solver, self.flight, self.disturbance
+        )

@@ -2,81 +2,24 @@
 """Independent check of a plan before it is flown: the solver's own word for it is not enough."""
 
 import math
-from dataclasses import dataclass, field, replace
-from enum import Enum
+from dataclasses import replace
 from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
-from nmpc_control.obstacle import Obstacle
+from nmpc_control.clearance_check import Obstacles, check_clearance
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.plan_consistency import as_flown, departure
 from nmpc_control.prediction import predict
 from nmpc_control.rotations import wrap_angle
 from nmpc_control.state import NU, NX, PITCH, POSITION, ROLL, VELOCITY, YAW, YAW_RATE, Plan
+from nmpc_control.verdict import NOT_INSIDE, Finding, Inside, PlanCheckParameters, Verdict
 
-SPACING = 0.05  # [m] of the points between two stages at which clearance is looked at
-MAX_POINTS = 40  # [1] between two stages
 PLAUSIBLE = 1e6  # [any unit] a plan with greater numbers counts as infinite
 MAX_HORIZON = 1000  # [1] stages; a longer plan is a broken one
 MAX_DT = 0.5  # [s] a longer stage is a broken one
 SAME_DELAY = 1e-6  # [s] by which the plan's dead time may differ from the guard's own
 MAX_YAW_RATE_JUMP = 1.0  # [rad/s] between plan and aircraft
-
-
-def _positive() -> float:
-    return field(metadata={"min": 1e-6})
-
-
-@dataclass(frozen=True)
-class PlanCheckParameters:
-    """How much a plan may differ from perfect, and how far it must stay away from obstacles."""
-
-    timeout: float = _positive()  # [s] a plan made longer ago is not flown
-    lead: float = _positive()  # [s] a plan may begin this much in the future
-    input_tolerance: float = _positive()  # [1] fraction of each input's range
-    position_residual: float = _positive()  # [m] per stage, against the guard's own model
-    attitude_residual: float = _positive()  # [rad]
-    velocity_residual: float = _positive()  # [m/s]
-    yaw_rate_residual: float = _positive()  # [rad/s]
-    position_jump: float = _positive()  # [m] from where the aircraft is expected
-    velocity_jump: float = _positive()  # [m/s]
-    attitude_jump: float = _positive()  # [rad] of roll and of pitch
-    minimum_clearance: float = field(metadata={"min": 0.0})  # [m] hull to surface
-    growth_tolerance: float = field(metadata={"min": 0.0})  # [m] nearer than now, where now is near
-    clearance_horizon: float = _positive()  # [s] ahead of now; a plan is replaced long before
-
-
-class Finding(Enum):
-    """Why a plan was refused."""
-
-    OK = "ok"
-    NOT_FOUND = "not_found"
-    SHAPE = "shape"
-    NOT_FINITE = "not_finite"
-    TOO_OLD = "too_old"
-    TOO_EARLY = "too_early"
-    INPUT_BOUNDS = "input_bounds"
-    DYNAMICS = "dynamics"
-    JUMP = "jump"
-    COLLISION = "collision"
-    CLEARANCE = "clearance"
-    ENVELOPE = "envelope"
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Outcome of a check."""
-
-    finding: Finding
-    sentence: str
-    clearance: float = math.inf  # [m] hull to the nearest surface over the rest of the plan
-    flown: Optional[Plan] = None  # the plan with the states to which its inputs take this aircraft
-
-    @property
-    def ok(self) -> bool:
-        """Whether the plan may be flown."""
-        return self.finding is Finding.OK
 
 
 def check_plan(
@@ -87,8 +30,9 @@ def check_plan(
     inputs: Sequence[Tuple[float, Sequence[float]]],
     vehicle: Vehicle,
     limits: Limits,
-    obstacles: Sequence[Obstacle],
+    obstacles: Obstacles,
     params: PlanCheckParameters,
+    before: Inside = NOT_INSIDE,
 ) -> Verdict:
     """Return whether a new plan may be flown at time ``t`` [s].
 
@@ -101,6 +45,7 @@ def check_plan(
         limits: bounds of the inputs.
         obstacles: as known now.
         params: tolerances.
+        before: where the aircraft was nearer than it should be already, and how near.
     """
     refusal = (
         _check_form(plan, vehicle)
@@ -112,8 +57,14 @@ def check_plan(
     if refusal:
         return refusal
     flown = as_flown(plan, t, state, inputs, vehicle)
-    refusal = _check_envelope(flown, t, state, limits, params)
-    return refusal or replace(check_clearance(flown, t, vehicle, obstacles, params), flown=flown)
+    out = max(0.0, float(_outside(state, limits)))
+    verdict = check_clearance(flown, t, vehicle, obstacles, params, before)
+    if verdict.inside is not None:
+        verdict = replace(verdict, inside=replace(verdict.inside, fence=out))
+    refusal = _check_envelope(flown, t, state, limits, params, before.fence)
+    if refusal:
+        return replace(refusal, clearance=verdict.clearance, inside=verdict.inside)
+    return verdict
 
 
 def check_flown(
@@ -121,77 +72,45 @@ def check_flown(
     *,
     t: float,
     vehicle: Vehicle,
-    obstacles: Sequence[Obstacle],
+    obstacles: Obstacles,
     params: PlanCheckParameters,
+    before: Inside = NOT_INSIDE,
 ) -> Verdict:
     """Return whether a plan that was verified before may be flown on at time ``t`` [s]."""
-    return _check_age(plan, t, params) or check_clearance(plan, t, vehicle, obstacles, params)
+    return _check_age(plan, t, params) or check_clearance(
+        plan, t, vehicle, obstacles, params, before
+    )
 
 
-def check_clearance(
-    plan: Plan,
-    t: float,
-    vehicle: Vehicle,
-    obstacles: Sequence[Obstacle],
-    params: PlanCheckParameters,
-) -> Verdict:
-    """Return whether the plan from ``t`` [s] on keeps clear of the obstacles as predicted now.
-
-    The hull must be free. Where it is nearer than the minimum now, it may not come nearer still, so
-    that the way out is open; where it touches by the estimate, the plan must lead out.
-    """
-    least = math.inf
-    for obstacle in obstacles:
-        times, clearance = _clearance_along(plan, t, obstacle, vehicle.radius)
-        if not np.isfinite(clearance).all():
-            sentence = f"obstacle {obstacle.id} is nowhere: its numbers are not finite"
-            return Verdict(Finding.CLEARANCE, sentence, math.nan)
-        least = min(least, float(clearance.min()))
-        now, ahead = clearance[0], clearance[times <= max(t, times[0]) + params.clearance_horizon]
-        nearest = float(ahead.min())
-        if now < 0.0:
-            if nearest < now - params.growth_tolerance or ahead[-1] <= now:
-                sentence = f"the plan leads deeper into obstacle {obstacle.id}"
-                return Verdict(Finding.COLLISION, sentence, least)
-        elif nearest < 0.0:
-            sentence = f"the plan hits obstacle {obstacle.id} by {-nearest:.2f} m"
-            return Verdict(Finding.COLLISION, sentence, least)
-        elif nearest < min(params.minimum_clearance, now - params.growth_tolerance):
-            sentence = f"the plan passes obstacle {obstacle.id} at {nearest:.2f} m"
-            return Verdict(Finding.CLEARANCE, sentence, least)
-    return Verdict(Finding.OK, "the plan is verified", least)
-
-
-def _clearance_along(
-    plan: Plan, t: float, obstacle: Obstacle, radius: float
-) -> Tuple[np.ndarray, np.ndarray]:
-    stages = plan.t + plan.delay + plan.dt * np.arange(len(plan.states))
-    centres = plan.states[:, POSITION]
-    relative = centres - obstacle.position_at(stages)
-    longest = float(np.linalg.norm(np.diff(relative, axis=0), axis=1).max())
-    count = math.ceil(min(max(1.0, longest / SPACING), MAX_POINTS))  # NaN gives 1
-    start = min(max(t, stages[0]), stages[-1])
-    times = np.linspace(stages[0], stages[-1], count * plan.horizon + 1)
-    times = np.concatenate([[start], times[times > start]])
-    points = np.stack([np.interp(times, stages, centres[:, i]) for i in range(3)], axis=1)
-    return times, obstacle.distance(points, times) - radius
+def _outside(x: np.ndarray, limits: Limits) -> np.ndarray:
+    """Return how far (...) [m] states (..., 10) are beyond the fence, negative within it."""
+    p = x[..., POSITION]
+    return np.maximum(limits.fence_min - p, p - limits.fence_max).max(axis=-1)
 
 
 def _check_envelope(
-    plan: Plan, t: float, state: np.ndarray, limits: Limits, params: PlanCheckParameters
+    plan: Plan,
+    t: float,
+    state: np.ndarray,
+    limits: Limits,
+    params: PlanCheckParameters,
+    left_at: float,
 ) -> Optional[Verdict]:
-    """Return a refusal where fence, ground or speed are exceeded, and more than they are now."""
+    """Return a refusal where fence, ground or speed are exceeded, and more than they are now.
+
+    Beyond the fence it may not go farther than ``left_at`` [m], where it was when the fence was
+    left, and the tolerance; where it has been pushed farther, the plan must lead back.
+    """
     stages = plan.t + plan.delay + plan.dt * np.arange(len(plan.states))
     ahead = plan.states[(stages >= t) & (stages <= t + params.clearance_horizon)]
     if not len(ahead):
         return None
-
-    def outside(x: np.ndarray) -> np.ndarray:
-        p = x[..., POSITION]
-        return np.maximum(limits.fence_min - p, p - limits.fence_max).max(axis=-1)
-
-    worst, now = float(outside(ahead).max()), max(0.0, float(outside(state)))
-    if worst > now + params.growth_tolerance:
+    out, now = _outside(ahead, limits), max(0.0, float(_outside(state, limits)))
+    worst, allowed = float(out.max()), (left_at if left_at and now else now)
+    is_far = now > allowed + params.growth_tolerance
+    if is_far and not out[-1] < now:
+        return Verdict(Finding.ENVELOPE, f"the plan stays {out[-1]:.2f} m outside the fence")
+    if worst > (now if is_far else allowed) + params.growth_tolerance:
         return Verdict(Finding.ENVELOPE, f"the plan leaves the fence by {worst:.2f} m")
     fastest = float(np.linalg.norm(ahead[:, VELOCITY], axis=1).max())
     speed = max(limits.speed, float(np.linalg.norm(state[VELOCITY])))

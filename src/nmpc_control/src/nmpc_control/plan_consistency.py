@@ -18,6 +18,8 @@ from nmpc_control.params import Vehicle
 from nmpc_control.prediction import Vector, derivative, predict, step
 from nmpc_control.state import ATTITUDE, POSITION, VELOCITY, YAW_RATE, Plan
 
+OPEN_LOOP = 1.0  # [s] for which a plan may be flown without another
+SETTLING = 0.5  # [s] in which later plans come back to this one
 EXPLAINED = 5e-3  # [m, rad, m/s, rad/s] by which a plan may depart from its own coarse integrator
 PARTS = (
     ("position", POSITION, "m"),
@@ -66,7 +68,8 @@ def as_flown(
     """Return the plan with the states to which its inputs take the aircraft from where it is.
 
     A plan that is consistent in itself may begin beside the aircraft; what counts is where its
-    inputs lead.
+    inputs lead. They are the last word for ``OPEN_LOOP``; farther ahead new plans will have made up
+    for what the model lacks, so that the plan's own states are approached.
     """
     states = plan.states.copy()
     first = max(0, math.ceil((t - plan.t - plan.delay) / plan.dt))
@@ -77,9 +80,13 @@ def as_flown(
     begin = plan.t + plan.delay + first * plan.dt
     x = predict(state, t, begin, history, vehicle)
     states[first] = x
-    for k in range(first, plan.horizon):
+    last = min(plan.horizon, first + math.ceil(OPEN_LOOP / plan.dt))
+    for k in range(first, last):
         x = step(x, plan.inputs[k], plan.dt, vehicle)
         states[k + 1] = x
+    ahead = plan.dt * np.arange(1, plan.horizon - last + 1)
+    offset = states[last] - plan.states[last]
+    states[last + 1 :] += np.exp(-ahead / SETTLING)[:, None] * offset
     return replace(plan, states=states)
 
 

@@ -26,7 +26,7 @@ def derivative(state: Sequence[float], u: Sequence[float], vehicle: Vehicle) -> 
         (vehicle.roll.gain * u[1] - roll) / vehicle.roll.time_constant,
         (vehicle.pitch.gain * u[2] - pitch) / vehicle.pitch.time_constant,
         yaw_rate,
-        *_acceleration(roll, pitch, yaw, velocity, u[0], vehicle.drag.tolist()),
+        *_acceleration(roll, pitch, yaw, velocity, u[0], vehicle),
         (vehicle.yaw_rate.gain * u[3] - yaw_rate) / vehicle.yaw_rate.time_constant,
     )
 
@@ -38,7 +38,6 @@ def step(state: Sequence[float], u: Sequence[float], dt: float, vehicle: Vehicle
     order that sees the exact attitude.
     """
     px, py, pz, roll, pitch, yaw, vx, vy, vz, yaw_rate = state
-    drag = vehicle.drag.tolist()
     thrust, half = u[0], dt / 2.0
 
     def attitude(t: float) -> Vector:
@@ -50,13 +49,13 @@ def step(state: Sequence[float], u: Sequence[float], dt: float, vehicle: Vehicle
 
     middle, end = attitude(half), attitude(dt)
     v1 = (vx, vy, vz)
-    a1 = _acceleration(roll, pitch, yaw, v1, thrust, drag)
+    a1 = _acceleration(roll, pitch, yaw, v1, thrust, vehicle)
     v2 = _move(v1, a1, half)
-    a2 = _acceleration(*middle, v2, thrust, drag)
+    a2 = _acceleration(*middle, v2, thrust, vehicle)
     v3 = _move(v1, a2, half)
-    a3 = _acceleration(*middle, v3, thrust, drag)
+    a3 = _acceleration(*middle, v3, thrust, vehicle)
     v4 = _move(v1, a3, dt)
-    a4 = _acceleration(*end, v4, thrust, drag)
+    a4 = _acceleration(*end, v4, thrust, vehicle)
     return (
         *_move((px, py, pz), _mean_slope(v1, v2, v3, v4), dt),
         *end,
@@ -121,14 +120,15 @@ def _acceleration(
     yaw: float,
     velocity: Sequence[float],
     thrust: float,
-    drag: Sequence[float],
+    vehicle: Vehicle,
 ) -> Vector:
+    drag, push = vehicle.drag.tolist(), vehicle.disturbance.tolist()
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     cy, sy = math.cos(yaw), math.sin(yaw)
     return (
-        thrust * (cr * sp * cy + sr * sy) - drag[0] * velocity[0],
-        thrust * (cr * sp * sy - sr * cy) - drag[1] * velocity[1],
-        thrust * cr * cp - GRAVITY - drag[2] * velocity[2],
+        thrust * (cr * sp * cy + sr * sy) - drag[0] * velocity[0] + push[0],
+        thrust * (cr * sp * sy - sr * cy) - drag[1] * velocity[1] + push[1],
+        thrust * cr * cp - GRAVITY - drag[2] * velocity[2] + push[2],
     )
 
 

@@ -1,91 +1,124 @@
 # SPDX-License-Identifier: MIT
-"""Which obstacles fill the slots of the problem: those that come nearest to the expected path."""
+"""Which obstacles fill the slots of the problem, and what the solver is told of them.
 
+Those come in that the aircraft would meet first. One that stays keeps its slot, so that multipliers
+of the last solution still belong to it.
+"""
+
+import copy
 from typing import List, Optional, Sequence
 
 import numpy as np
 
 from nmpc_control.errors import ProblemError
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.ocp import SLOT_SIZE
+from nmpc_control.obstacle_field import ObstacleField
+from nmpc_control.ocp import EMPTY_SLOT, SLOT_SIZE
+
+_LATER = 0.3  # [m/s] a conflict this much later weighs as much as a metre more of clearance
 
 
 class Slots:
-    """Obstacles as arrays; a message of hundreds is converted once and used for many solves."""
+    """The obstacles of the last message as arrays, and who sits where."""
 
-    def __init__(self) -> None:
-        self._obstacles: Optional[Sequence[Obstacle]] = None
-        self.left_out = 0  # obstacles in reach of the path that found no slot
+    def __init__(self, count: int) -> None:
+        """Begin with ``count`` empty slots."""
+        self.left_out = 0  # obstacles in reach of the paths that found no slot
+        self.renewed: List[int] = []  # slots that were given to another obstacle last
+        self.field = ObstacleField(())
+        self.occupants: List[Optional[str]] = [None] * count
+        self._given: Optional[Sequence[Obstacle]] = None
 
     def fill(
         self,
         obstacles: Sequence[Obstacle],
         times: np.ndarray,
-        path: np.ndarray,
+        paths: Sequence[np.ndarray],
         margin: float,
-        count: int,
+        reach: float = 0.0,
+        between: bool = True,
     ) -> np.ndarray:
-        """Return slot data (at most count, N + 1, 5), see ``ocp.SLOT_SIZE``, nearest first.
+        """Return slot data (slots, N + 1, 5), see ``ocp.SLOT_SIZE``.
+
+        Between two stages that keep a distance s the straight way may come as near as the root of
+        s^2 less the square of half the way; that is what the distances at the stages are raised by.
 
         Args:
-            obstacles: any number; a box counts as the sphere around it.
+            obstacles: any number.
             times: (N + 1,) [s] of the stages.
-            path: (N + 1, 3) [m] where the aircraft is expected at them.
-            margin: [m] least distance from an obstacle's surface.
-            count: number of slots.
+            paths: each (N + 1, 3) [m] where the aircraft may be at them, the expected one first.
+            margin: [m] least distance of the centre from an obstacle's surface.
+            reach: [m] beyond the margin within which an obstacle counts as in reach.
+            between: whether the margin is to hold between the stages, too.
 
         Raises:
             ProblemError: an obstacle that is nowhere or has no size.
         """
-        if obstacles is not self._obstacles or not isinstance(obstacles, tuple):
-            self._convert(obstacles)
+        if obstacles is not self._given or not isinstance(obstacles, tuple):
+            self._given, self.field = None, ObstacleField(obstacles)
+            if self.field.unusable:
+                raise ProblemError(
+                    f"obstacle {self.field.unusable[0]}: expected numbers that are finite, and a "
+                    "size of more than 0"
+                )
+            self._given = obstacles
         self.left_out = 0
-        if not len(obstacles):
-            return np.empty((0, len(times), SLOT_SIZE))
-        age = times - self._stamp[:, None]
-        centres = self._position[:, None] + age[..., None] * self._velocity[:, None]
-        offset = path - centres
-        offset[..., 2] *= self._vertical[:, None]
-        nearest = np.sqrt(np.einsum("ijk,ijk->ij", offset, offset).min(axis=1)) - self._radius
-        order = np.argsort(nearest, kind="stable")
-        chosen = order[:count]
-        self.left_out = int(np.sum(nearest[order[count:]] < margin))
-        data = np.empty((len(chosen), len(times), SLOT_SIZE))
-        data[..., :3] = centres[chosen]
-        data[..., 3] = self._vertical[chosen, None]
-        data[..., 4] = 1.0 / (self._radius[chosen, None] + margin)
+        data = np.tile(EMPTY_SLOT, (len(self.occupants), len(times), 1))
+        if not len(self.field):
+            self._seat([])
+            return data
+        distances = [self.field.distances(path, times) for path in paths]
+        later = _LATER * (times - times[0])
+        conflict = np.min([(d + later).min(axis=1) for d in distances], axis=0)
+        order = np.argsort(conflict, kind="stable")
+        chosen, rest = order[: len(self.occupants)], order[len(self.occupants) :]
+        nearest = np.min([d[rest].min(axis=1) for d in distances], axis=0)
+        self.left_out = int(np.sum(nearest < margin + reach))
+        self._seat([self.field.ids[i] for i in chosen])
+        spheres = self.field.part(chosen).spheres(paths[0], times)
+        half = _half_ways(paths[0], spheres.centres) if between else 0.0
+        rows = [self.occupants.index(self.field.ids[i]) for i in chosen]
+        data[rows, :, :3] = spheres.centres
+        data[rows, :, 3] = spheres.vertical
+        data[rows, :, 4] = 1.0 / np.hypot(spheres.radius + margin, half)
         return data
 
-    def _convert(self, obstacles: Sequence[Obstacle]) -> None:
-        self._obstacles = None
-        for o in obstacles:
-            numbers = np.concatenate([o.position, o.velocity, o.size])
-            if not np.all(np.isfinite(numbers)) or not np.all(np.asarray(o.size) > 0.0):
-                raise ProblemError(
-                    f"obstacle {o.id}: got position {o.position}, velocity {o.velocity}, size "
-                    f"{o.size}, expected numbers that are finite, and a size of more than 0"
-                )
-        self._obstacles = obstacles
-        moving = [o.stamp is not None for o in obstacles]
-        zero = np.zeros(3)
-        self._position = _rows([o.position for o in obstacles])
-        self._velocity = _rows([o.velocity if m else zero for o, m in zip(obstacles, moving)])
-        self._stamp = np.array([o.stamp if m else 0.0 for o, m in zip(obstacles, moving)])
-        self._vertical = np.array([o.shape != "cylinder" for o in obstacles], dtype=float)
-        self._radius = np.array(
-            [
-                0.5 * float(np.linalg.norm(o.size)) if o.shape == "box" else float(o.size[0])
-                for o in obstacles
-            ]
-        )
+    def copy(self) -> "Slots":
+        """Return the same obstacles in the same seats, to be filled on their own."""
+        other = copy.copy(self)
+        other.occupants = list(self.occupants)
+        return other
+
+    def _seat(self, chosen: List[str]) -> None:
+        """Give the chosen ones a slot each; those that had one keep it."""
+        staying, self.renewed = set(chosen), []
+        seated = [name if name in staying else None for name in self.occupants]
+        free = [i for i, name in enumerate(seated) if name is None]
+        taken = set(seated)
+        for name in chosen:
+            if name not in taken:
+                slot = free.pop(0)
+                seated[slot] = name
+                self.renewed.append(slot)
+        self.occupants = seated
 
 
-def clearance(slots: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Return how far (n,) [m] a position (3,) is from where the terms of slots (n, 5) begin."""
-    offset = (position - slots[:, :3]) ** 2
-    offset[:, 2] *= slots[:, 3]
-    return np.sqrt(offset.sum(axis=1)) - 1.0 / slots[:, 4]
+def _half_ways(path: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """Return half of the longer way (n, M) [m] to the stages before and after."""
+    ways = np.linalg.norm(np.diff(path - centres, axis=1), axis=2) / 2.0
+    longest = np.zeros(centres.shape[:2])
+    longest[:, 1:] = ways
+    longest[:, :-1] = np.maximum(longest[:, :-1], ways)
+    return longest
 
 
-def _rows(vectors: List[np.ndarray]) -> np.ndarray:
-    return np.array(vectors, dtype=float).reshape(-1, 3)
+def clearance(slots: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """Return how far (n, M) [m] positions (M, 3) are from where the terms of slots begin.
+
+    Args:
+        slots: (n, M, SLOT_SIZE) data.
+        positions: (M, 3) [m].
+    """
+    offset = (positions - slots[..., :3]) ** 2
+    offset[..., 2] *= slots[..., 3]
+    return np.sqrt(offset.sum(axis=-1)) - 1.0 / slots[..., SLOT_SIZE - 1]

@@ -52,13 +52,20 @@ class SqpSolver:
         tolerance: [1] part of the cost (plus 1) that may be left to gain.
         max_iterations: Newton steps at most.
         time_budget: [s] wall time after which no further step is begun.
+        warm_iterations: Newton steps at most from a good guess; None: as many as from none.
     """
 
     def __init__(
-        self, structure: Structure, tolerance: float, max_iterations: int, time_budget: float
+        self,
+        structure: Structure,
+        tolerance: float,
+        max_iterations: int,
+        time_budget: float,
+        warm_iterations: Optional[int] = None,
     ) -> None:
         self.structure = structure
         self.tolerance, self.max_iterations = tolerance, max_iterations
+        self.warm_iterations = min(max_iterations, warm_iterations or max_iterations)
         self.time_budget = time_budget
         functions = compile_functions(sweeps(structure))
         self._arrays: Dict[str, np.ndarray] = {}
@@ -82,11 +89,11 @@ class SqpSolver:
         a["x0"][:, 0], a["u_before"][:, 0] = instance.x0, instance.u_before
         a["stages"][:], a["theta"][:, 0] = instance.stages, instance.theta
         self._alpha = 1.0
-        cost, model = self._begin(instance, guess)
+        cost, model, most = self._begin(instance, guess)
         accuracy, before = _FIRST_ACCURACY, np.inf
         iterations, status, step = 0, "budget", Step(np.inf, -np.inf, np.inf, 0, False)
         while np.isfinite(cost):
-            if iterations >= self.max_iterations or time.perf_counter() - start > self.time_budget:
+            if iterations >= most or time.perf_counter() - start > self.time_budget:
                 break
             step = self._direction(model)
             scale = 1.0 + self._tracking
@@ -142,15 +149,16 @@ class SqpSolver:
             multipliers=a["multipliers"].T.copy(),
         )
 
-    def _begin(self, instance: Instance, guess: Optional[Guess]) -> Tuple[float, StepModel]:
-        """Set the first iterate; return its cost and the first model."""
+    def _begin(self, instance: Instance, guess: Optional[Guess]) -> Tuple[float, StepModel, int]:
+        """Set the first iterate; return its cost, the first model and the most iterations."""
         trials = []
         if guess is not None and np.all(np.isfinite(guess.inputs)):
             self._load(guess.states, guess.inputs, guess.gains, guess.multipliers)
             cost = self._evaluate(0.0)
             if cost <= _BAD_GUESS * (1.0 + guess.cost):
                 self._accept()
-                return cost, StepModel(newton=guess.gains is not None)
+                warm = guess.gains is not None
+                return cost, StepModel(warm), self.warm_iterations if warm else self.max_iterations
             trials.append(self._trial(cost))
         hover = cold_guess(instance.x0, self.structure.horizon)
         self._load(hover.states, hover.inputs)
@@ -164,12 +172,12 @@ class SqpSolver:
             trials.append(self._trial(self._evaluate(alpha)))
         trials = [trial for trial in trials if np.isfinite(trial[0])]
         if not trials:
-            return np.inf, StepModel(False)
+            return np.inf, StepModel(False), 0
         _, X, U = min(trials, key=lambda trial: trial[0])
         self._load(X, U)
         cost = self._evaluate(0.0)
         self._accept()
-        return cost, StepModel(newton=False)
+        return cost, StepModel(False), self.max_iterations
 
     def _load(
         self,

@@ -15,6 +15,7 @@ class Timing(Protocol):
     """Maps times to curve parameters."""
 
     duration: float  # [s]
+    continuous: bool  # False: it jumps
 
     def __call__(self, t: np.ndarray) -> Motion:
         """Return s, s', s'' at times t (M,) [s] in [0, duration]."""
@@ -22,6 +23,8 @@ class Timing(Protocol):
 
 class Uniform:
     """Curve parameter uniform in time, the paper's: fast where the parameter is stretched."""
+
+    continuous = True
 
     def __init__(self, duration: float) -> None:
         self.duration = duration
@@ -33,6 +36,8 @@ class Uniform:
 
 class ConstantSpeed:
     """The same speed all along the curve."""
+
+    continuous = True
 
     def __init__(self, curve: Curve, duration: float) -> None:
         self.duration = duration
@@ -52,6 +57,8 @@ class ConstantSpeed:
 class RestToRest:
     """Accelerate, cruise, brake: at rest at both ends, within a limit of s' and one of s''."""
 
+    continuous = True
+
     def __init__(self, rate: float, acceleration: float) -> None:
         self._acceleration = acceleration
         self._rate = min(rate, math.sqrt(acceleration))  # short ways have no cruise
@@ -70,6 +77,8 @@ class RestToRest:
 
 class Jump:
     """At the start until a moment, then at the end."""
+
+    continuous = False
 
     def __init__(self, time: float, duration: float) -> None:
         self.duration = duration

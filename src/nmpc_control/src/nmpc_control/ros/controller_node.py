@@ -42,11 +42,10 @@ from nmpc_control.ros.subscriptions import Subscriptions
 from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
 from nmpc_control.rotations import rpy_from_quaternion
 from nmpc_control.scenario import Scenario, load_scenario
-from nmpc_control.state import POSITION, YAW, Goal, hover_input
+from nmpc_control.state import POSITION, YAW, Goal
 from nmpc_msgs.msg import ControllerStatus, ObstacleArray
 
 _ENGAGED = (ControllerStatus.MODE_FLYING, ControllerStatus.MODE_HOVERING)
-_HOVER = tuple(hover_input())
 
 
 class ControllerNode:
@@ -59,7 +58,7 @@ class ControllerNode:
         self.scenario: Optional[Scenario] = None
         offered = rospy.get_param("~scenario", "")
         self._offered = load_scenario(offered) if offered else None
-        self._inputs: Deque[Tuple[float, Tuple[float, ...]]] = deque(maxlen=200)
+        self._inputs: Deque[Tuple[float, Optional[Tuple[float, ...]]]] = deque(maxlen=200)
         self._requests: "queue.Queue[Callable[[float], None]]" = queue.Queue(maxsize=20)
         self._known: Dict[str, Obstacle] = {}  # of scenarios: a new goal does not remove them
         self._heard: Dict[str, Obstacle] = {}
@@ -112,7 +111,7 @@ class ControllerNode:
         t = now.to_sec()
         while self._inputs:
             sent, u = self._inputs.popleft()
-            self.controller.record_input(sent, np.array(u))
+            self.controller.record_input(sent, None if u is None else np.array(u))
         while not self._requests.empty():
             self._requests.get_nowait()(t)
         if self._new_obstacles is not None:
@@ -238,10 +237,10 @@ class ControllerNode:
 
         def on_status(m: ControllerStatus) -> None:
             self.controller.engaged = m.mode in _ENGAGED
+            self.controller.braking = m.mode == ControllerStatus.MODE_BRAKING
             u = (m.applied.thrust, m.applied.roll, m.applied.pitch, m.applied.yaw_rate)
-            # what DJI or the pilot does is not known; level hover is the nearest that is
             known = m.setpoint_sent and np.all(np.isfinite(u))
-            self._inputs.append((m.header.stamp.to_sec(), u if known else _HOVER))
+            self._inputs.append((m.header.stamp.to_sec(), u if known else None))
 
         def on_obstacles(m: ObstacleArray) -> None:
             try:

@@ -12,11 +12,10 @@ from nmpc_control.guard import Guard
 from nmpc_control.guard_data import Action, GuardOutput
 from nmpc_control.guard_inbox import GuardInbox
 from nmpc_control.guard_params import GuardParameters
-from nmpc_control.mode_inputs import PLANNED, STREAMING, Request
+from nmpc_control.mode_inputs import PLANNED, STREAMING, Mode, Request
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters
 from nmpc_control.scenario import Scenario
-from nmpc_control.state import hover_input
 from uav_sim.body import BodyState
 from uav_sim.disturbance import Disturbance
 from uav_sim.errors import SimulatorError
@@ -140,8 +139,9 @@ class ClosedLoop:
         if output.axes is not None:
             self.aircraft.setpoint(_GENERIC, output.axes)
         known = output.axes is not None and output.applied is not None
-        self.controller.record_input(self.t, np.array(output.applied) if known else hover_input())
+        self.controller.record_input(self.t, np.array(output.applied) if known else None)
         self.controller.engaged = output.mode in PLANNED
+        self.controller.braking = output.mode is Mode.BRAKING
         self.log.outputs.append((self.t, output))
 
     def _act(self, action: Action) -> None:

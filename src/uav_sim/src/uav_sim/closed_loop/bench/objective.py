@@ -13,6 +13,7 @@ from nmpc_control.ocp import (
     Symbols,
     inequalities,
     next_state,
+    penalty_weights,
     stage_cost,
 )
 from nmpc_control.state import NU, NX
@@ -33,7 +34,8 @@ class Objective:
 
     def __init__(self, structure: Structure) -> None:
         s = Symbols(structure)
-        penalty = s.bounds["soft_weight"] * ca.sum1(ca.fmax(0, inequalities(structure, s)))
+        excess = ca.fmax(0, inequalities(structure, s))
+        penalty = ca.dot(penalty_weights(structure, s), excess)
         inner = stage_cost(structure, s, terminal=False) + penalty
         last = stage_cost(structure, s, terminal=True) + penalty
         x_next = next_state(structure, s)

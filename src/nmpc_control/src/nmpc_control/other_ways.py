@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""Solutions on other sides of what stands on the reference, and when one is worth changing to.
+
+A local optimiser stays on the side on which it began, and head-on on none. While the reference
+leads through an obstacle, each tick tries some other ways round (``guides``), and one that is
+cheaper by more than a little replaces the solution; the little keeps the side from flipping.
+"""
+
+from dataclasses import dataclass, replace
+from typing import List, Optional, Protocol, Sequence
+
+import numpy as np
+
+from nmpc_control.guides import SIDES, Turns, conflicts, eased, sides, way_round
+from nmpc_control.obstacle import Obstacle
+from nmpc_control.ocp import PARTS, Instance, Structure
+from nmpc_control.packing import pack_stages
+from nmpc_control.slots import Slots
+from nmpc_control.solution import Guess, Solution
+from nmpc_control.state import NU, NX, POSITION, VELOCITY
+
+_BETTER = 0.95  # of its cost: what is dearer than this is no reason to change
+_SIDEWAYS = 1.5  # [m/s] of a way away from the reference
+
+
+class Solver(Protocol):
+    """A backend."""
+
+    def solve(self, instance: Instance, guess: Optional[Guess] = None) -> Solution:
+        """Return the solution."""
+
+
+@dataclass
+class Posed:
+    """One problem with its obstacles; slots depend on where the aircraft may go."""
+
+    structure: Structure
+    times: np.ndarray  # (N + 1,) [s]
+    x0: np.ndarray  # (10,)
+    u_before: np.ndarray  # (4,)
+    x_ref: np.ndarray  # (N + 1, 10)
+    u_ref: np.ndarray  # (4,) or (N, 4)
+    theta: np.ndarray  # (THETA_SIZE,)
+    obstacles: Sequence[Obstacle]
+    margin: float  # [m] least distance of the centre from surfaces
+    reach: float  # [m] beyond it, where terms begin
+    between: bool  # whether the margin holds between the stages, too
+
+    def instance(self, slots: Slots, paths: List[np.ndarray]) -> Instance:
+        """Return the numbers for the solver, with obstacles near some paths (N + 1, 3) [m]."""
+        data = slots.fill(self.obstacles, self.times, paths, self.margin, self.reach, self.between)
+        return self._with(self.x_ref, data, self.theta)
+
+    def free(self, path: np.ndarray) -> Instance:
+        """Return the problem of following a path (N + 1, 3) [m] without obstacles."""
+        x_ref = self.x_ref.copy()
+        x_ref[:, POSITION] = path
+        x_ref[:, VELOCITY] = np.gradient(path, self.structure.dt, axis=0)
+        theta = self.theta.copy()
+        theta[PARTS["eta"]] = theta[PARTS["hard_obstacles"]] = 0.0
+        return self._with(x_ref, (), theta)
+
+    def _with(self, x_ref: np.ndarray, slots: Sequence[np.ndarray], theta: np.ndarray) -> Instance:
+        stages = pack_stages(self.structure, x_ref, self.u_ref, slots)
+        return Instance(self.x0, self.u_before, stages, theta)
+
+
+class OtherWays:
+    """Tries sides in turn, and counts how often one was better."""
+
+    def __init__(self, tries: int, shooting: bool) -> None:
+        """Begin.
+
+        Args:
+            tries: sides tried in one tick beside the last tick's; none: no side ever is.
+            shooting: whether the solver takes a guess by its inputs.
+        """
+        self._tries = tries
+        self.changes = 0
+        self._turns = Turns()
+        self._shooting = shooting
+
+    def improve(
+        self, solver: Solver, problem: Posed, solution: Solution, slots: Slots, warm: bool
+    ) -> "Choice":
+        """Return the solution with its slots, or a much better one with its own.
+
+        Args:
+            solver: the backend.
+            problem: what is solved.
+            solution: what it found from its own guess.
+            slots: where the obstacles sit in it.
+            warm: whether it began from the last tick's solution; else all sides are tried.
+        """
+        reference = eased(problem.x_ref[:, POSITION], problem.x0[POSITION], problem.times)
+        spheres = slots.field.spheres(reference, problem.times)
+        best = Choice(solution, slots, blocked=conflicts(spheres, problem.margin, reference))
+        if not (best.blocked.any() and self._tries):
+            return best
+        across = sides(reference[-1] - reference[0])
+        slope = _SIDEWAYS * problem.structure.dt
+        for index in self._turns.take(self._tries if warm and solution.found else SIDES):
+            way = way_round(spheres, problem.margin, reference, across[index], slope)
+            if way is None:
+                continue
+            seats = slots.copy()
+            instance = problem.instance(seats, [way, reference])
+            other = solver.solve(instance, self._guess(solver, problem, way))
+            if other.found and other.cost < _BETTER * best.solution.cost:
+                best = replace(best, solution=other, slots=seats)
+                self.changes += 1
+        return best
+
+    def _guess(self, solver: Solver, problem: Posed, way: np.ndarray) -> Guess:
+        follow = problem.free(way)
+        if self._shooting:
+            found = solver.solve(follow)
+            return Guess(found.states, found.inputs)
+        states = follow.stages[:NX].T.copy()
+        states[0] = problem.x0
+        inputs = np.broadcast_to(problem.u_ref, (problem.structure.horizon, NU))
+        return Guess(states, np.array(inputs))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A solution, where its obstacles sit, and which obstacles stand on the reference."""
+
+    solution: Solution
+    slots: Slots
+    blocked: np.ndarray  # (n,) of all obstacles

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""When the guard brakes although there is a plan: no room to stop later, obstacles too long unseen.
+
+It holds the aircraft back inside the mode that it is in, so the goal is kept, and lets the plans go
+on as soon as the reason is gone.
+"""
+
+import math
+from typing import Optional
+
+import numpy as np
+
+from nmpc_control.braking import BrakeParameters
+from nmpc_control.obstacle_field import ObstacleField
+from nmpc_control.params import Vehicle
+from nmpc_control.state import GRAVITY, VELOCITY, Plan
+from nmpc_control.stopping import StoppingParameters, clearance_of, shortfall, way_to_stop
+from nmpc_control.verdict import PlanCheckParameters, Verdict
+
+# [1] on the braking distance at full deceleration: what it takes on both plants, not at worst
+EXPECTED = 1.1
+
+
+class Override:
+    """Remembers since when it brakes; ``reason`` once per tick in which a plan would be flown."""
+
+    def __init__(
+        self,
+        params: StoppingParameters,
+        brake: BrakeParameters,
+        vehicle: Vehicle,
+        period: float,
+        plan_check: PlanCheckParameters,
+    ) -> None:
+        """Begin without braking.
+
+        Args:
+            params: of the stopping distance.
+            brake: the guard's own.
+            vehicle: for hull and lags.
+            period: [s] between two ticks.
+            plan_check: for how long a plan is flown, and over which time it is judged.
+        """
+        self.params = params
+        self.brake = brake
+        self.vehicle = vehicle
+        self.period = period
+        self.horizon = plan_check.clearance_horizon
+        self.plan_timeout = plan_check.timeout
+        self.forget()
+
+    def forget(self) -> None:
+        """Brake no more, as when no plan is flown or the clock went backwards."""
+        self.active = False
+        self.remark = ""  # why it would brake, but the plan is better
+        self._until = -math.inf
+        self._reason = ""
+
+    def brake_clearance(self, state: np.ndarray, t: float, obstacles: ObstacleField) -> float:
+        """Return how near [m] a brake comes to an obstacle, and standing still after it.
+
+        Args:
+            state: (10,) when the brake takes effect.
+            t: [s] of that.
+            obstacles: as known now.
+        """
+        swing = math.atan(self.brake.deceleration / GRAVITY) / self.brake.tilt_rate
+        latency = self.period + swing / 2.0
+        way = way_to_stop(state, self.vehicle, self.brake, latency, EXPECTED)
+        return clearance_of(way, self.horizon, t, obstacles, self.vehicle.radius)
+
+    def reason(
+        self,
+        t: float,
+        stale: str,
+        state: Optional[np.ndarray],
+        obstacles: ObstacleField,
+        plan: Optional[Plan],
+        verdict: Verdict,
+    ) -> str:
+        """Return why to brake at ``t`` [s]; empty: the plan may be flown.
+
+        Args:
+            t: [s] now.
+            stale: why the obstacles are not known well enough; empty: they are.
+            state: (10,) when a command sent now takes effect; None: unknown.
+            obstacles: as known now.
+            plan: that would be flown, with the states to which it leads.
+            verdict: on this plan, now.
+        """
+        self.remark = ""
+        reason = stale or self._no_room(t, state, obstacles, plan, verdict)
+        if reason and (stale or not self.active):
+            self._until = t + self.params.dwell
+        self._reason = reason or self._reason
+        self.active = bool(reason) or (self.active and t < self._until)
+        return self._reason if self.active else ""
+
+    def _no_room(
+        self,
+        t: float,
+        state: Optional[np.ndarray],
+        obstacles: ObstacleField,
+        plan: Optional[Plan],
+        verdict: Verdict,
+    ) -> str:
+        p = self.params
+        if not p.enabled or state is None or plan is None or obstacles.unusable:
+            return ""
+        if float(np.linalg.norm(state[VELOCITY])) < p.least_speed:
+            return ""
+        age = max(0.0, t - plan.t)
+        way = way_to_stop(state, self.vehicle, self.brake, self.period + age, p.factor)
+        in_effect, radius = t + self.vehicle.delay, self.vehicle.radius
+        room = p.release if self.active else 0.0
+        found = shortfall(way, in_effect, obstacles, radius, p.margin, room)
+        if found is None:
+            return ""
+        kept = self._kept(in_effect, age, plan, verdict, obstacles)
+        gain = self.brake_clearance(state, in_effect, obstacles) - kept
+        if self.active:
+            gain += 2.0 * p.advantage
+        if (kept < p.margin or self.active) and gain > p.advantage:
+            return str(found)
+        self.remark = f"{found}; the plan keeps {kept:.2f} m"
+        return ""
+
+    def _kept(
+        self, t: float, age: float, plan: Plan, verdict: Verdict, obstacles: ObstacleField
+    ) -> float:
+        """Return how far [m] from obstacles one stays who flies the plan.
+
+        One that has just come and leads past them at a good distance is taken at its word. Of any
+        other the guard must be able to make the best should no more plans come: it flies it until
+        it is too old, and then brakes.
+        """
+        p = self.params
+        leads_past = verdict.nearest >= p.evasion and verdict.speed >= p.least_speed
+        if leads_past and age <= p.evasion_age:
+            return verdict.nearest
+        later = t + max(0.0, self.plan_timeout - age)
+        after = self.brake_clearance(plan.state_at(later), later, obstacles)
+        return min(verdict.nearest, after)
