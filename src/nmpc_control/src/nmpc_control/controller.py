@@ -16,7 +16,7 @@ from nmpc_control.estimator import Estimator, StateEstimate
 from nmpc_control.itinerary import Itinerary
 from nmpc_control.nmpc import Nmpc
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.obstacle_field import ObstacleField
+from nmpc_control.obstacle_field import FieldOf
 from nmpc_control.params import Parameters, Vehicle
 from nmpc_control.prediction import predict
 from nmpc_control.solution import no_solution
@@ -63,6 +63,7 @@ class Controller:
         self.braking = False  # it does not, but brakes and will again
         self._inputs: Deque[Tuple[float, np.ndarray]] = deque()
         self._unknown = -np.inf  # [s] when an input was sent last that the model does not have
+        self._field_of = FieldOf()
         self._disturbance = DisturbanceEstimate(parameters.disturbance)
 
     def use(self, parameters: Parameters) -> None:
@@ -160,5 +161,5 @@ class Controller:
 
     def _clearance(self, positions: np.ndarray, times: np.ndarray) -> float:
         """Return the least distance [m] from hull to surface for positions (M, 3) at times (M,)."""
-        distances = ObstacleField(self.obstacles).distances(positions, times)
+        distances = self._field_of(self.obstacles).distances(positions, times)
         return float(distances.min(initial=np.inf)) - self.parameters.vehicle.radius

@@ -23,8 +23,7 @@ from nmpc_control.mode_inputs import (
     Request,
     preflight,
 )
-from nmpc_control.obstacle import Obstacle
-from nmpc_control.obstacle_field import ObstacleField
+from nmpc_control.obstacle_field import FieldOf, ObstacleField
 from nmpc_control.override import Override
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.sent_inputs import SentInputs
@@ -57,8 +56,7 @@ class Guard:
         self.override = Override(
             params.stopping, params.brake, vehicle, 1.0 / params.rate, params.plan_check
         )
-        self._obstacles = ObstacleField(())
-        self._converted: Sequence[Obstacle] = ()
+        self._field_of = FieldOf()
         self._disturbance = DisturbanceEstimate(params.disturbance)
         self._reason = ""
         self._failures = 0
@@ -69,7 +67,7 @@ class Guard:
         if i.t < self._t:
             self._forget(i.t)
         dt, self._t = min(max(i.t - self._t, 0.0), MAX_TICK), i.t
-        obstacles = self._as_field(i.obstacles)
+        obstacles = self._field_of(i.obstacles)
         self._learn(i)
 
         def brake_clearance() -> float:
@@ -136,12 +134,6 @@ class Guard:
             estimate.update(i.t, i.estimate.vector, history, known)
         push = vehicle.disturbance + estimate.acceleration
         self._sent.vehicle = self.ladder.vehicle = replace(vehicle, disturbance=push)
-
-    def _as_field(self, obstacles: Sequence[Obstacle]) -> ObstacleField:
-        """Return obstacles as arrays, made once for each tuple of them."""
-        if obstacles is not self._converted or not isinstance(obstacles, tuple):
-            self._obstacles, self._converted = ObstacleField(obstacles), obstacles
-        return self._obstacles
 
     def _take_plan(
         self, i: GuardInputs, obstacles: ObstacleField, brake_clearance: Callable[[], float]

@@ -4,7 +4,8 @@
 Converted once for each list; hundreds cost little more than one.
 """
 
-from typing import List, NamedTuple, Sequence, Tuple
+from functools import cached_property
+from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -50,7 +51,7 @@ class ObstacleField:
         """Return some of them, by their indices (k,), in that order."""
         return ObstacleField([self.obstacles[i] for i in which])
 
-    @property
+    @cached_property
     def unusable(self) -> Tuple[str, ...]:
         """Ids of those that are nowhere, or have no size."""
         numbers = np.hstack([self._position, self._velocity, self._size])
@@ -104,6 +105,20 @@ class ObstacleField:
             centres[flat] += nearest - ROUND * normal
             radius[flat] += ROUND - self._size[which, 0]
         return Spheres(centres, vertical, radius)
+
+
+class FieldOf:
+    """Obstacles as arrays, converted once for each tuple of them."""
+
+    def __init__(self) -> None:
+        self._given: Optional[Sequence[Obstacle]] = None
+        self._field = ObstacleField(())
+
+    def __call__(self, obstacles: Sequence[Obstacle]) -> ObstacleField:
+        """Return the arrays of some obstacles."""
+        if obstacles is not self._given or not isinstance(obstacles, tuple):
+            self._field, self._given = ObstacleField(obstacles), obstacles
+        return self._field
 
 
 def _nearest(

@@ -88,9 +88,12 @@ def _check_numbers(
         ("inflation", avoidance.inflation),
         ("cushion", avoidance.cushion),
         ("allowance", avoidance.allowance),
+        ("eta", avoidance.eta),
+        ("cushion_gain", avoidance.cushion_gain),
+        ("weight", avoidance.weight),
     ):
         if not 0 <= value < np.inf:
-            raise ProblemError(f"{name}: got {value}, expected a length")
+            raise ProblemError(f"{name}: got {value}, expected a number >= 0")
 
 
 def check_arguments(

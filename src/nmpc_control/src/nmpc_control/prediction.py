@@ -87,6 +87,9 @@ def predict(
         effect = sent + vehicle.delay
         if effect >= t1:
             break
+        if effect <= t:
+            acting = u
+            continue
         x, t = _advance(x, acting, effect - t, vehicle), max(t, effect)
         acting = u
     return np.array(_advance(x, acting, t1 - t, vehicle))

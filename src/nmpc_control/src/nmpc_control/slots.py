@@ -12,7 +12,7 @@ import numpy as np
 
 from nmpc_control.errors import ProblemError
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.obstacle_field import ObstacleField
+from nmpc_control.obstacle_field import FieldOf, ObstacleField
 from nmpc_control.ocp import EMPTY_SLOT, SLOT_SIZE
 
 _LATER = 0.3  # [m/s] a conflict this much later weighs as much as a metre more of clearance
@@ -27,7 +27,7 @@ class Slots:
         self.renewed: List[int] = []  # slots that were given to another obstacle last
         self.field = ObstacleField(())
         self.occupants: List[Optional[str]] = [None] * count
-        self._given: Optional[Sequence[Obstacle]] = None
+        self._field_of = FieldOf()
 
     def fill(
         self,
@@ -54,14 +54,12 @@ class Slots:
         Raises:
             ProblemError: an obstacle that is nowhere or has no size.
         """
-        if obstacles is not self._given or not isinstance(obstacles, tuple):
-            self._given, self.field = None, ObstacleField(obstacles)
-            if self.field.unusable:
-                raise ProblemError(
-                    f"obstacle {self.field.unusable[0]}: expected numbers that are finite, and a "
-                    "size of more than 0"
-                )
-            self._given = obstacles
+        self.field = self._field_of(obstacles)
+        if self.field.unusable:
+            raise ProblemError(
+                f"obstacle {self.field.unusable[0]}: expected numbers that are finite, and a size "
+                "of more than 0"
+            )
         self.left_out = 0
         data = np.tile(EMPTY_SLOT, (len(self.occupants), len(times), 1))
         if not len(self.field):

@@ -52,7 +52,7 @@ class SqpSolver:
         tolerance: [1] part of the cost (plus 1) that may be left to gain.
         max_iterations: Newton steps at most.
         time_budget: [s] wall time after which no further step is begun.
-        warm_iterations: Newton steps at most from a good guess; None: as many as from none.
+        warm_iterations: the same from a good guess; None: as many.
     """
 
     def __init__(
