@@ -26,6 +26,7 @@ _TILT_SHARE = 0.95  # of the bound of one axis, for both together
 _SLACK_WEIGHT = 100.0  # [1/m] of the L1 penalty, against mean squares of acceleration
 _JERK_WEIGHT = 0.05  # [s^2]
 _ROUNDS = 3  # solves, each with the spheres nearest to the last result
+_SAME = 0.02  # [m] a round that moves no control point by more ends the search
 _OPTIONS = {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
@@ -78,7 +79,8 @@ def improve(
             return points
         points = points.copy()
         points[spline.CLAMPED : -spline.CLAMPED] = found
-        if spheres.excess(t, _positions(points)).min(initial=np.inf) > 0.0:
+        clear = spheres.excess(t, _positions(points)).min(initial=np.inf) > 0.0
+        if clear or np.abs(found - free).max() < _SAME:
             return points
     return points
 
