@@ -185,7 +185,6 @@ class Guard:
         is_held = bool(i.obstacles_stale) and self.mode in PLANNED and self.ladder.is_blocked(i.t)
         return replace(
             telemetry,
-            needs_gps=p.position_source == "gps",
             verified_plans=self.ladder.verified,
             plan_usable=(rung is not Rung.NONE or is_held) and is_fresh,
             plan_finding="" if verdict.ok else verdict.sentence,

@@ -25,6 +25,7 @@ class GuardInbox:
         self.authority = False  # as far as the last answer of dji_sdk tells
         self.failure = ""  # how a service call failed, until the next tick
         self.request: Optional[Request] = None
+        self.needs_gps = True  # the position comes from GPS
         self._switch = params.rc_switch
         self._rc: Tuple[float, Sequence[float]] = (-math.inf, ())
         self._left_f: Optional[dji.RcMode] = None  # since the last tick, however briefly
@@ -81,6 +82,7 @@ class GuardInbox:
             flight_status=dji.flight_status(self._status[1]),
             gps_age=t - self._gps[0],
             gps_health=self._gps[1],
+            needs_gps=self.needs_gps,
             battery_age=t - self._battery[0],
             battery=self._battery[1],
             authority=self.authority,
