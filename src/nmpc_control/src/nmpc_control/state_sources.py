@@ -27,7 +27,7 @@ class Switch:
     """A change of source: both nodes take the same one."""
 
     source: str
-    t: float  # [s]
+    t: float  # [s] when the difference begins to be let go
     offset: np.ndarray  # (3,) [m] added to the new source's position at first
     speed_offset: np.ndarray  # (3,) [m/s] the same of its velocity
     duration: float  # [s] in which both are let go
@@ -150,7 +150,8 @@ class StateSources:
             bound = f"at most {p.max_speed:g} m/s"
             return False, f"{name} and {self.active} differ by {speed:.2f} m/s, {bound}"
         duration = max(p.blend_time, distance / p.blend_speed)
-        self.follow(Switch(name, t, offset, speed_offset, duration))
+        begin = t + self.parameters.telemetry_latency  # no sample has been told of a later time
+        self.follow(Switch(name, begin, offset, speed_offset, duration))
         return True, f"position comes from {name}; {distance:.2f} m let go in {duration:.1f} s"
 
     def follow(self, switch: Switch) -> None:
