@@ -18,7 +18,6 @@ from nmpc_control.params import load_vehicle
 from nmpc_control.state import Goal, hover_input
 
 INDOORS = {"gps_health": 0, "needs_gps": False}
-EXTERNAL = dataclasses.replace(PARAMS, position_source="external")
 LENIENT = dataclasses.replace(
     PARAMS,
     plan_check=dataclasses.replace(
@@ -45,7 +44,7 @@ def airborne(position=(0.0, 0.0, 5.0), velocity=(0.0, 0.0, 0.0), yaw=0.0, **kwar
 
 
 def flight_without_gps(aircraft=None, solver=None):
-    flight = Flight(params=EXTERNAL, aircraft=aircraft or airborne(), solver=solver)
+    flight = Flight(params=PARAMS, aircraft=aircraft or airborne(), solver=solver)
     flight.change = dict(INDOORS)
     return flight
 
@@ -537,7 +536,7 @@ def test_a_single_exception_on_the_ground_changes_nothing():
 
 
 def test_first_flights_command_vertical_velocity_instead_of_thrust():
-    params = dataclasses.replace(EXTERNAL, vertical_command="velocity")
+    params = dataclasses.replace(PARAMS, vertical_command="velocity")
     flight = Flight(params=params, aircraft=airborne())
     flight.change = dict(INDOORS)
     flight.run(1.0)

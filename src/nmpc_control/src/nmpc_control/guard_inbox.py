@@ -31,7 +31,7 @@ class GuardInbox:
         self.authority = False  # as far as the last answer of dji_sdk tells
         self.failure = ""  # how a service call failed, until the next tick
         self.request: Optional[Request] = None
-        self.needs_gps = params.position_source == "gps"  # the position comes from GPS
+        self.needs_gps = True  # the position comes from GPS
         self.yaw_disagreement = math.nan  # [rad] motion capture's less dji_sdk's
         self.rejected: Dict[str, int] = Counter()  # values that are not finite, per source
         self._liveness = Liveness()

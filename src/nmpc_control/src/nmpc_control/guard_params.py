@@ -25,7 +25,6 @@ class GuardParameters:
 
     rate: float = field(metadata={"min": 10.0, "max": 50.0})  # [Hz] of commands
     world_frame: str = field()  # frame of plans and obstacles
-    position_source: str = field(metadata={"choices": ("gps", "external")})
     vertical_command: str = field(metadata={"choices": ("thrust", "velocity")})
     hold_timeout: float = _positive()  # [s] in which the controller must obey `hover`
     reference_retry: float = _positive()  # [s] between requests for a local position reference

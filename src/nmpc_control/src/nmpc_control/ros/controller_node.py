@@ -4,7 +4,7 @@
 Never commands the aircraft.
 
 ROS Subscribers:
-    dji_sdk/attitude, dji_sdk/imu, dji_sdk/velocity, dji_sdk/local_position: the state.
+    the state: see ``state_port``; nmpc/position_source (nmpc_msgs/PositionSource): its source.
     nmpc/status (nmpc_msgs/ControllerStatus): mode of the guard and the input really sent.
     nmpc/hold_request (std_msgs/Empty): drop the goal and hold position.
     obstacles, nmpc/forget_obstacles: see ``obstacle_port`` and ``obstacle_services``.
@@ -29,9 +29,8 @@ from typing import Callable, Deque, Dict, Optional, Tuple
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import PointStamped, PoseStamped, QuaternionStamped, Vector3Stamped
-from sensor_msgs.msg import Imu
-from std_msgs.msg import Empty, Header, String
+from geometry_msgs.msg import PoseStamped
+from std_msgs.msg import Empty, String
 
 from nmpc_control.controller import Controller
 from nmpc_control.errors import ConfigError, NmpcError
@@ -39,12 +38,15 @@ from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters, load_parameters, load_weights
 from nmpc_control.ros.obstacle_port import ObstaclePort
 from nmpc_control.ros.publishers import Publishers
+from nmpc_control.ros.source_switch import TOPIC as SOURCE_TOPIC
+from nmpc_control.ros.source_switch import follow
+from nmpc_control.ros.state_port import StatePort
 from nmpc_control.ros.subscriptions import Subscriptions
 from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
 from nmpc_control.rotations import rpy_from_quaternion
 from nmpc_control.scenario import Scenario, load_scenario
 from nmpc_control.state import POSITION, YAW, Goal
-from nmpc_msgs.msg import ControllerStatus
+from nmpc_msgs.msg import ControllerStatus, PositionSource
 
 _ENGAGED = (ControllerStatus.MODE_FLYING, ControllerStatus.MODE_HOVERING)
 
@@ -66,6 +68,8 @@ class ControllerNode:
         base_frame = rospy.get_param("~base_frame", f"{rospy.get_namespace()}base_link".lstrip("/"))
         self.publishers = Publishers(self.frame_id, base_frame)
         self.publishers.add_diagnostics("obstacles", self._port.diagnose)
+        self.state = StatePort(self.controller.estimator, self.frame_id)
+        self.publishers.add_diagnostics("position", self.state.diagnose)
         self.action = TrajectoryAction(
             on_goal=lambda: self._request(self._accept_goal),
             on_cancel=lambda: self._request(self._cancel_goal),
@@ -107,6 +111,7 @@ class ControllerNode:
         self.controller = Controller(self.parameters)
         self._inputs.clear()
         self._port.start_anew()
+        self.state.start_anew(self.controller.estimator)
         self.action.finish(rospy.Time.now().to_sec(), False, "the clock jumped backwards")
 
     def _tick(self, now: rospy.Time, misses: int) -> None:
@@ -219,22 +224,6 @@ class ControllerNode:
         self._port.subscribe(subscriptions, known=False)
         listen = subscriptions.add
 
-        def on_attitude(m: QuaternionStamped) -> None:
-            q = m.quaternion
-            self.controller.estimator.add_attitude(_time(m.header), (q.x, q.y, q.z, q.w))
-
-        def on_imu(m: Imu) -> None:
-            w = m.angular_velocity
-            self.controller.estimator.add_imu(_time(m.header), (w.x, w.y, w.z))
-
-        def on_velocity(m: Vector3Stamped) -> None:
-            v = m.vector
-            self.controller.estimator.add_velocity(_time(m.header), (v.x, v.y, v.z))
-
-        def on_position(m: PointStamped) -> None:
-            p = m.point
-            self.controller.estimator.add_position(_time(m.header), (p.x, p.y, p.z))
-
         def on_status(m: ControllerStatus) -> None:
             self.controller.engaged = m.mode in _ENGAGED
             self.controller.braking = m.mode == ControllerStatus.MODE_BRAKING
@@ -242,10 +231,8 @@ class ControllerNode:
             known = m.setpoint_sent and np.all(np.isfinite(u))
             self._inputs.append((m.header.stamp.to_sec(), u if known else None))
 
-        listen("dji_sdk/attitude", QuaternionStamped, on_attitude)
-        listen("dji_sdk/imu", Imu, on_imu)
-        listen("dji_sdk/velocity", Vector3Stamped, on_velocity)
-        listen("dji_sdk/local_position", PointStamped, on_position)
+        self.state.subscribe(subscriptions)
+        listen(SOURCE_TOPIC, PositionSource, lambda m: follow(self.state, m), queue_size=10)
         listen("nmpc/status", ControllerStatus, on_status, queue_size=10)
         listen(
             "nmpc/hold_request",
@@ -271,11 +258,6 @@ def load_node_parameters() -> Parameters:
         solver=replace(parameters.solver, backend=backend),
         avoidance=replace(parameters.avoidance, enabled=avoidance),
     )
-
-
-def _time(header: Header) -> float:
-    """Return the message's time [s]; one from the future counts as now."""
-    return min(header.stamp.to_sec(), rospy.Time.now().to_sec())
 
 
 def _along(scenario: Scenario) -> np.ndarray:

@@ -7,7 +7,7 @@ ROS Publishers:
     nmpc/hold_request (std_msgs/Empty): tells the controller to drop its goal.
     nmpc/status, /diagnostics: see ``guard_reports``.
 ROS Services: start, hover, land, release (std_srvs/Trigger), answered with a reason in words;
-    those of ``obstacle_services``.
+    those of ``obstacle_services`` and ``source_switch``.
 ROS Parameters:
     ~vehicle (str): file under config/vehicles.
     ~avoidance (bool): false leaves obstacles out of the plan check.
@@ -34,12 +34,13 @@ from nmpc_control.errors import ConfigError, NmpcError
 from nmpc_control.guard import Guard
 from nmpc_control.guard_data import Action, GuardOutput
 from nmpc_control.guard_params import load_guard_parameters
-from nmpc_control.mode_inputs import ModeInputs, Request
+from nmpc_control.mode_inputs import AUTOMATIC, ModeInputs, Request
 from nmpc_control.params import load_parameters
 from nmpc_control.ros.dji_services import DjiServices
 from nmpc_control.ros.guard_listener import GuardListener
 from nmpc_control.ros.guard_reports import GuardReports
 from nmpc_control.ros.obstacle_services import ObstacleServices
+from nmpc_control.ros.source_switch import SourceSwitch
 
 OVERSLEPT = 0.06  # [s] of wall time between two ticks: this process was not running
 CATCH_UP = 0.01  # [s] of wall time that callbacks then get
@@ -66,6 +67,8 @@ class GuardNode:
         self._reports = GuardReports(guard, self._listener.rejected_samples)
         self._reports.add("obstacles", self._listener.obstacles.diagnose)
         self._obstacle_services = ObstacleServices(self._listener.obstacles)
+        self._reports.add("position", self._listener.state.diagnose)
+        SourceSwitch(self._listener.state, lambda: guard.mode in AUTOMATIC)
         self._dji = DjiServices(self._listener.set_authority, self._listener.report_failure)
         self._questions: "queue.Queue[_Question]" = queue.Queue(maxsize=10)
         self._is_leaving = False

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Controller, guard and simulated aircraft on one clock, without ROS."""
 
-import dataclasses
 from dataclasses import dataclass, field
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
@@ -16,6 +15,8 @@ from nmpc_control.mode_inputs import FOLLOWED, PLANNED, STREAMING, Mode, Request
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters
 from nmpc_control.scenario import Scenario
+from nmpc_control.source_params import GPS, VICON, SourcesParameters, load_source_parameters
+from nmpc_control.state_sources import StateSources
 from uav_sim.body import BodyState
 from uav_sim.disturbance import Disturbance
 from uav_sim.errors import SimulatorError
@@ -49,8 +50,9 @@ class NoFlightError(SimulatorError):
 class ClosedLoop:
     """One vehicle under automatic control; ``step`` advances all of it by one step of the plant.
 
-    Its position comes from motion capture where the disturbance has it, else from GPS. Obstacles
-    that move, or drift with the position, are handed over as sensed, at 10 Hz.
+    Its position comes from motion capture where the disturbance has it, else from GPS, unless
+    ``sources`` says otherwise. Obstacles that move, or drift with the position, are handed over as
+    sensed, at 10 Hz.
     """
 
     def __init__(
@@ -60,16 +62,18 @@ class ClosedLoop:
         parameters: Parameters,
         guard_parameters: GuardParameters,
         disturbance: Optional[Disturbance] = None,
+        sources: Optional[SourcesParameters] = None,
     ) -> None:
         self.aircraft = SimulatedM100(preset, world, disturbance)
-        self._captured = disturbance is not None and disturbance.vicon is not None
-        if self._captured:
-            guard_parameters = dataclasses.replace(guard_parameters, position_source="external")
+        captured = disturbance is not None and disturbance.vicon is not None
+        sources = sources or load_source_parameters(position_source=VICON if captured else GPS)
         is_shifted = disturbance is not None and disturbance.shift is not None
         self.senses = self.aircraft.world.moves or is_shifted  # obstacles, again and again
         self.controller = Controller(parameters)
         self.guard = Guard(guard_parameters, parameters.vehicle, parameters.limits)
         self.inbox = GuardInbox(guard_parameters)
+        estimators = (self.controller.estimator, self.inbox.estimator)
+        self.sources = tuple(StateSources(sources, estimator) for estimator in estimators)
         self.log = Log()
         self._ticks = _every(1.0 / guard_parameters.rate, preset.step)
         self._solves = _every(1.0 / parameters.solver.budget.rate, preset.step)
@@ -88,8 +92,8 @@ class ClosedLoop:
         for packet in self.aircraft.step():
             self._receive(packet.topic, packet.t, packet.value)
         for pose in self.aircraft.new_poses:
-            for estimator in (self.controller.estimator, self.inbox.estimator):
-                estimator.add_position(pose.t, pose.position)
+            for sources in self.sources:
+                sources.add_pose(*pose)
         if self.senses and self._count % self._looks == 0:
             self._look()
         self._count += 1
@@ -102,15 +106,16 @@ class ClosedLoop:
             self.log.truths.append(self.aircraft.truth)
 
     def _receive(self, topic: str, t: float, value: Any) -> None:
-        for estimator in (self.controller.estimator, self.inbox.estimator):
+        for sources in self.sources:
+            estimator = sources.estimator
             if topic == "attitude":
                 estimator.add_attitude(t, value)
             elif topic == "imu":
                 estimator.add_imu(t, value.angular_velocity)
             elif topic == "velocity":
-                estimator.add_velocity(t, value)
-            elif topic == "local_position" and not self._captured:
-                estimator.add_position(t, value)
+                sources.add_velocity(t, value)
+            elif topic == "local_position":
+                sources.add_position(GPS, t, value)
         timed: Dict[str, Callable[[float, Any], None]] = {
             "rc": self.inbox.add_rc,
             "flight_status": self.inbox.add_flight_status,
@@ -138,6 +143,7 @@ class ClosedLoop:
         self.log.steps.append(step)
 
     def _tick(self) -> None:
+        self.inbox.needs_gps = self.sources[1].active == GPS
         output = self.guard.tick(self.inbox.inputs(self.t))
         for action in output.actions:
             self._act(action, output)
