@@ -7,9 +7,10 @@ ROS Subscribers:
     the state: see ``state_port``; nmpc/position_source (nmpc_msgs/PositionSource): its source.
     nmpc/status (nmpc_msgs/ControllerStatus): mode of the guard and the input really sent.
     nmpc/hold_request (std_msgs/Empty): drop the goal and hold position.
+    nmpc/return_request (geometry_msgs/PointStamped): drop the goal and fly there.
     obstacles, nmpc/forget_obstacles: see ``obstacle_port`` and ``obstacle_services``.
     command/pose (geometry_msgs/PoseStamped): go to this point.
-ROS Action: fly_trajectory (nmpc_msgs/FlyTrajectory).
+ROS Action: fly_trajectory (nmpc_msgs/FlyTrajectory). ROS Services: see ``resume_service``.
 ROS Publishers: see ``publishers``.
 ROS Parameters:
     ~vehicle (str): file under config/vehicles. ~weights (str): weight preset, default the
@@ -29,15 +30,17 @@ from typing import Callable, Deque, Dict, Optional, Tuple
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PointStamped, PoseStamped
 from std_msgs.msg import Empty, String
 
 from nmpc_control.controller import Controller
 from nmpc_control.errors import ConfigError, NmpcError
+from nmpc_control.mode_inputs import FOLLOWED, PLANNED
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters, load_parameters, load_weights
 from nmpc_control.ros.obstacle_port import ObstaclePort
 from nmpc_control.ros.publishers import Publishers
+from nmpc_control.ros.resume_service import ResumeService
 from nmpc_control.ros.source_switch import TOPIC as SOURCE_TOPIC
 from nmpc_control.ros.source_switch import follow
 from nmpc_control.ros.state_port import StatePort
@@ -45,10 +48,8 @@ from nmpc_control.ros.subscriptions import Subscriptions
 from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
 from nmpc_control.rotations import rpy_from_quaternion
 from nmpc_control.scenario import Scenario, load_scenario
-from nmpc_control.state import POSITION, YAW, Goal
+from nmpc_control.state import POSITION, YAW
 from nmpc_msgs.msg import ControllerStatus, PositionSource
-
-_ENGAGED = (ControllerStatus.MODE_FLYING, ControllerStatus.MODE_HOVERING)
 
 
 class ControllerNode:
@@ -84,6 +85,7 @@ class ControllerNode:
         """
         self.action.start()
         self._subscribe()
+        ResumeService(self._request, lambda t: self.controller.take_up(t))
         rate = rospy.Rate(self.parameters.solver.budget.rate)
         period = 1.0 / self.parameters.solver.budget.rate
         misses, last = 0, None
@@ -123,7 +125,7 @@ class ControllerNode:
             self._requests.get_nowait()(t)
         self.controller.obstacles, _ = self._port.look(t)
         self.publishers.obstacles(t, self.controller.obstacles)
-        pursued = self.controller.itinerary.goal is not Goal.HOLD
+        pursued = self.controller.itinerary.pursued
         clock_start = self.controller.itinerary.clock_start
         step = self.controller.step(t)
         self.publishers.diagnose(step, misses)
@@ -202,6 +204,17 @@ class ControllerNode:
             self.action.finish(t, False, "replaced by command/pose")
             self.controller.itinerary.go_to(t, x[POSITION], x[YAW], target, yaw)
 
+    def _return(self, t: float, message: PointStamped) -> None:
+        """Fly to where the guard says that automatic flight began."""
+        p = message.point
+        target = np.array([p.x, p.y, p.z])
+        estimate = self.controller.estimator.estimate(t)
+        if estimate is None or not self.controller.engaged or not np.all(np.isfinite(target)):
+            return
+        self.action.finish(t, False, "the battery is low")
+        x = estimate.vector
+        self.controller.itinerary.go_to(t, x[POSITION], x[YAW], target, float(x[YAW]))
+
     def _is_inside_fence(self, points: np.ndarray) -> bool:
         limits = self.parameters.limits
         return bool(np.all((points >= limits.fence_min) & (points <= limits.fence_max)))
@@ -225,8 +238,9 @@ class ControllerNode:
         listen = subscriptions.add
 
         def on_status(m: ControllerStatus) -> None:
-            self.controller.engaged = m.mode in _ENGAGED
+            self.controller.engaged = m.mode in PLANNED
             self.controller.braking = m.mode == ControllerStatus.MODE_BRAKING
+            self.controller.manual = m.mode in FOLLOWED
             u = (m.applied.thrust, m.applied.roll, m.applied.pitch, m.applied.yaw_rate)
             known = m.setpoint_sent and np.all(np.isfinite(u))
             self._inputs.append((m.header.stamp.to_sec(), u if known else None))
@@ -238,6 +252,11 @@ class ControllerNode:
             "nmpc/hold_request",
             Empty,
             lambda m: self._request(lambda t: self._hold(t, "told to hold")),
+        )
+        listen(
+            "nmpc/return_request",
+            PointStamped,
+            lambda m: self._request(lambda t: self._return(t, m)),
         )
         listen("nmpc/forget_obstacles", String, lambda m: self._port.forget(m.data), queue_size=10)
         listen("command/pose", PoseStamped, lambda m: self._request(lambda t: self._go_to(t, m)))

@@ -51,14 +51,20 @@ class GuardListener:
             subscriptions.add(topic, kind, self._locked(callback))
         self.obstacles.subscribe(subscriptions, known=True)
 
-    def take(self, t: float, request: Optional[Request]) -> GuardInputs:
-        """Return what a tick at ``t`` [s] sees, with the operator's request."""
+    def take(self, t: float, steady: Optional[float], request: Optional[Request]) -> GuardInputs:
+        """Return what a tick at ``t`` [s] sees, with the operator's request.
+
+        ``steady`` [s] is a clock that nobody sets; None: ``t`` is one.
+        """
         with self._lock:
             if self.avoidance:
                 self._inbox.obstacles, self._inbox.obstacles_stale = self.obstacles.look(t)
             self._inbox.request = request
-            self._inbox.needs_gps = self.state.sources.active == GPS
-            return self._inbox.inputs(t)
+            sources = self.state.sources
+            self._inbox.needs_gps = sources.active == GPS
+            yaw = sources.yaw_disagreement(t)
+            self._inbox.yaw_disagreement = math.nan if yaw is None else yaw
+            return self._inbox.inputs(t, steady)
 
     @property
     def authority(self) -> bool:
@@ -85,7 +91,7 @@ class GuardListener:
 
     def rejected_samples(self) -> str:
         """Return how many samples of which source were refused."""
-        counts = self._inbox.estimator.rejected
+        counts = self._inbox.refused
         return ", ".join(f"{name} {count}" for name, count in counts.items()) or "none"
 
     def _locked(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:

@@ -5,12 +5,14 @@ ROS Subscribers: see ``guard_listener``.
 ROS Publishers:
     dji_sdk/flight_control_setpoint_generic (sensor_msgs/Joy): 50 Hz while automatic flight is on.
     nmpc/hold_request (std_msgs/Empty): tells the controller to drop its goal.
+    nmpc/return_request (geometry_msgs/PointStamped): tells it to fly there; the battery is low.
     nmpc/status, /diagnostics: see ``guard_reports``.
 ROS Services: start, hover, land, release (std_srvs/Trigger), answered with a reason in words;
     those of ``obstacle_services`` and ``source_switch``.
 ROS Parameters:
     ~vehicle (str): file under config/vehicles.
     ~avoidance (bool): false leaves obstacles out of the plan check.
+    ~simulated (bool): a simulator is flown: its thrust map counts, its RC stands in F already.
     ~frame_id (str): world frame, instead of the one in ``config/guard.yaml``.
 """
 
@@ -26,10 +28,12 @@ from dataclasses import replace
 from typing import Callable, Optional
 
 import rospy
+from geometry_msgs.msg import Point, PointStamped
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Empty, Header
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
+from nmpc_control import start_checks
 from nmpc_control.errors import ConfigError, NmpcError
 from nmpc_control.guard import Guard
 from nmpc_control.guard_data import Action, GuardOutput
@@ -73,11 +77,14 @@ class GuardNode:
         self._questions: "queue.Queue[_Question]" = queue.Queue(maxsize=10)
         self._is_leaving = False
         self._t = 0.0
+        self._world_frame = guard.params.world_frame
         self._telemetry = ModeInputs()  # of the last tick
         self._setpoint = rospy.Publisher(
             "dji_sdk/flight_control_setpoint_generic", Joy, queue_size=1, tcp_nodelay=True
         )
         self._hold = rospy.Publisher("nmpc/hold_request", Empty, queue_size=1)
+        self._return = rospy.Publisher("nmpc/return_request", PointStamped, queue_size=1)
+        self._has_steady = not rospy.get_param("/use_sim_time", False)
         for request in Request:
             rospy.Service(request.value, Trigger, self._serve(request))
         rospy.on_shutdown(self._leave)
@@ -125,7 +132,8 @@ class GuardNode:
         t = max(now.to_sec(), self._t)  # a small step back: time stands still until it is caught up
         self._t = t
         question = self._next_question()
-        inputs = self._listener.take(t, question.request if question else None)
+        steady = time.monotonic() if self._has_steady else None  # simulated time is steady itself
+        inputs = self._listener.take(t, steady, question.request if question else None)
         self._telemetry = inputs.telemetry
         try:
             output = self.guard.tick(inputs)
@@ -147,6 +155,9 @@ class GuardNode:
             self._listener.set_authority(False)
         if Action.HOLD in output.actions:
             self._hold.publish(Empty())
+        if Action.RETURN in output.actions:
+            header = Header(stamp=rospy.Time.from_sec(self._t), frame_id=self._world_frame)
+            self._return.publish(PointStamped(header, Point(*output.target)))
         self._dji.order(output.actions)
 
     def _leave(self) -> None:
@@ -176,7 +187,7 @@ class GuardNode:
 
 
 def main() -> None:
-    """Entry point of the node: exit status 2 on bad parameters, 1 where it must not fly."""
+    """Entry point of the node: exit status 2 on bad parameters."""
     rospy.init_node("flight_guard", disable_signals=True)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
@@ -189,7 +200,8 @@ def main() -> None:
         gc.freeze()  # or now and then a tick would wait until all modules were looked through again
         node.run()
     except NmpcError as error:
-        sys.exit(_refuse(str(error), 2))
+        rospy.logfatal(str(error))
+        sys.exit(2)
     except KeyboardInterrupt:
         pass  # rospy's own handler would end ROS before authority is given back
     finally:
@@ -200,11 +212,14 @@ def _guard() -> Guard:
     params = load_guard_parameters()
     params = replace(params, world_frame=rospy.get_param("~frame_id", params.world_frame))
     parameters = load_parameters(_vehicle_name())
+    simulated = bool(rospy.get_param("~simulated", False))
+    if simulated:
+        params = replace(params, modes=replace(params.modes, needs_switch=False))
     vehicle = parameters.vehicle
-    if params.vertical_command == "thrust" and not vehicle.thrust_map.measured_on:
-        where = f"vehicles/{vehicle.name}.yaml: thrust_map.measured_on is empty"
-        sys.exit(_refuse(f"{where}: thrust is not commanded through an unmeasured map", 1))
-    return Guard(params, vehicle, parameters.limits)
+    refusal = start_checks.thrust_map(vehicle, params.vertical_command, simulated)
+    if refusal:
+        rospy.logerr(f"start will be refused: {refusal}")
+    return Guard(params, vehicle, parameters.limits, refusal)
 
 
 def _ask_for_priority() -> None:
@@ -219,8 +234,3 @@ def _vehicle_name() -> str:
     if not name:
         raise ConfigError("parameter", "~vehicle", name, "the name of a file in config/vehicles")
     return name
-
-
-def _refuse(sentence: str, status: int) -> int:
-    rospy.logfatal(sentence)
-    return status

@@ -5,6 +5,7 @@ ROS Publishers: nmpc/status (nmpc_msgs/ControllerStatus), /diagnostics.
 """
 
 import math
+import os
 from typing import Callable, Optional, Tuple
 
 import diagnostic_updater
@@ -20,6 +21,8 @@ from nmpc_msgs.msg import ControlInput, ControllerStatus, Plan
 
 Wrapper = diagnostic_updater.DiagnosticStatusWrapper
 _ATTENTION = (Mode.BRAKING, Mode.RELEASED, Mode.FAULT)
+LATE_SHARE = 0.02  # [1] of late periods from which on the loop is reported
+OVERLOAD = 1.0  # [1] processes that want a core, per core
 _SILENT = ControlInput(math.nan, math.nan, math.nan, math.nan)
 
 
@@ -38,6 +41,8 @@ class GuardReports:
         self._updater.add("flight", self._diagnose_flight)
         self._updater.add("telemetry", self._diagnose_telemetry)
         self._updater.add("plans", self._diagnose_plans)
+        self._updater.add("loop", self._diagnose_loop)
+        self._updater.add("battery", self._diagnose_battery)
 
     def add(self, name: str, diagnose: Callable[[Wrapper], Wrapper]) -> None:
         """Have another entry in /diagnostics."""
@@ -58,6 +63,7 @@ class GuardReports:
             mode=int(output.mode),
             rung=int(output.rung),
             reason=output.reason,
+            reason_code=output.code,
             authority=telemetry.authority,
             setpoint_sent=output.axes is not None,
             applied=_SILENT if output.applied is None else ControlInput(*output.applied),
@@ -65,6 +71,11 @@ class GuardReports:
             reference_time=last_plan.reference_time if output.mode in PLANNED else math.nan,
             plan_age=guard.ladder.age(inputs.t),
             state_age=max(ages),
+            position_age=telemetry.position_age,
+            velocity_age=telemetry.velocity_age,
+            attitude_age=telemetry.attitude_age,
+            rc_age=telemetry.rc_age,
+            battery_age=telemetry.battery_age,
             obstacle_age=obstacle_age,
             plans_received=guard.ladder.received,
             plans_rejected=guard.ladder.rejected,
@@ -74,6 +85,8 @@ class GuardReports:
             deadline_misses=last_plan.deadline_misses,
             predicted_clearance=output.clearance,
             battery=telemetry.battery,
+            loop_rate=guard.situation.loop.rate,
+            loop_jitter=guard.situation.loop.jitter,
         )
         message.header.stamp = now
         self._status.publish(message)
@@ -89,7 +102,11 @@ class GuardReports:
         level = DiagnosticStatus.ERROR if output.mode is Mode.FAULT else level
         status.summary(level, f"{output.mode.name.lower().replace('_', ' ')}: {output.reason}")
         status.add("rung", Rung(output.rung).name.lower().replace("_", " "))
+        status.add("reason code", output.code)
         status.add("authority", str(inputs.telemetry.authority))
+        situation = self._guard.situation
+        status.add("commands without effect [s]", f"{situation.effect.total:.1f}")
+        status.add("jumps of the position", str(situation.watch.jumps))
         return status
 
     def _diagnose_telemetry(self, status: Wrapper) -> Wrapper:
@@ -125,4 +142,29 @@ class GuardReports:
         status.summary(level, f"last verified plan {age:.2f} s ago")
         status.add("received", str(ladder.received))
         status.add("rejected", str(ladder.rejected))
+        return status
+
+    def _diagnose_loop(self, status: Wrapper) -> Wrapper:
+        """Rate and jitter of the stream's own loop, and what else the computer does."""
+        loop = self._guard.situation.loop
+        load = os.getloadavg()[0] / (os.cpu_count() or 1)
+        is_late = loop.late > LATE_SHARE
+        level = DiagnosticStatus.WARN if is_late or load > OVERLOAD else DiagnosticStatus.OK
+        status.summary(level, f"{loop.rate:.1f} Hz, worst gap {1e3 * loop.worst:.0f} ms")
+        status.add("jitter p99 [ms]", f"{1e3 * loop.jitter:.1f}")
+        status.add("periods late [%]", f"{100.0 * loop.late:.1f}")
+        status.add("load per core", f"{load:.2f}")
+        return status
+
+    def _diagnose_battery(self, status: Wrapper) -> Wrapper:
+        if self._last is None:
+            status.summary(DiagnosticStatus.WARN, "nothing received")
+            return status
+        telemetry, p = self._last[0].telemetry, self._guard.params.modes
+        is_known = telemetry.battery_age <= p.battery_timeout
+        is_low = telemetry.battery < p.battery_start
+        level = DiagnosticStatus.OK if is_known and not is_low else DiagnosticStatus.WARN
+        level = DiagnosticStatus.ERROR if telemetry.battery < p.battery_low else level
+        status.summary(level, f"{telemetry.battery:.0%}" if is_known else "not heard of")
+        status.add("when low", p.battery_action)
         return status
