@@ -18,7 +18,7 @@ def flight(ros):
     ros.wait_for_node("/uav_sim")
     nodes = ("flight_guard", "nmpc_controller")
     for name in nodes:
-        ros.start("rosrun", "nmpc_control", name, "_vehicle:=dji_hil")
+        ros.start("rosrun", "nmpc_control", name, "_vehicle:=dji_hil", "_simulated:=true")
     for name in nodes:
         ros.wait_for_node(f"/{name}")
     return ros
@@ -70,27 +70,26 @@ def test_ctrl_c_in_the_air_gives_authority_back(flight):
     assert "Traceback" not in log
 
 
-def test_thrust_is_not_commanded_through_an_unmeasured_map(monkeypatch):
+def test_thrust_is_not_commanded_through_a_map_of_no_airframe(monkeypatch):
     pytest.importorskip("nmpc_msgs", reason="the workspace is not built or not sourced")
     from nmpc_control.ros import guard_node
 
-    parameters = guard_node.load_parameters("eth")
-    thrust_map = dataclasses.replace(parameters.vehicle.thrust_map, measured_on="")
-    vehicle = dataclasses.replace(parameters.vehicle, thrust_map=thrust_map)
-    unmeasured = dataclasses.replace(parameters, vehicle=vehicle)
-    monkeypatch.setattr(guard_node, "load_parameters", lambda name: unmeasured)
-    monkeypatch.setattr(guard_node.rospy, "get_param", lambda name, default: "eth")
+    ros_parameters = {"~vehicle": "eth"}
+    monkeypatch.setattr(guard_node.rospy, "get_param", ros_parameters.get)
     said = []
-    monkeypatch.setattr(guard_node.rospy, "logfatal", said.append)
-    with pytest.raises(SystemExit) as end:
-        guard_node._guard()
-    assert end.value.code == 1
-    assert len(said) == 1
-    assert "vehicles/eth.yaml: thrust_map.measured_on is empty" in said[0]
+    monkeypatch.setattr(guard_node.rospy, "logerr", said.append)
+    refusal = guard_node._guard().situation.refusal
+    assert "vehicles/eth.yaml: thrust_map.measured_on is a simulator's" in refusal
+    assert said == [f"start will be refused: {refusal}"]
+
+    ros_parameters["~simulated"] = True
+    assert guard_node._guard().situation.refusal == ""
 
     params = dataclasses.replace(guard_node.load_guard_parameters(), vertical_command="velocity")
     monkeypatch.setattr(guard_node, "load_guard_parameters", lambda: params)
-    assert guard_node._guard().vehicle is vehicle  # the first flights' profile needs no map
+    ros_parameters["~simulated"] = False
+    assert guard_node._guard().situation.refusal == ""  # the first flights' profile needs no map
+    assert guard_node._guard().params.modes.needs_switch
 
 
 def test_an_unknown_vehicle_ends_in_one_line(ros):

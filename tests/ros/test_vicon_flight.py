@@ -11,7 +11,7 @@ def test_a_flight_indoors_follows_vicon_changes_its_source_and_ends_where_vicon_
     ros.launch("uav_sim", "simulator.launch", disturbance="indoor", seed=3, speed_factor=1.5)
     ros.wait_for_node("/uav_sim")
     sources = {"position_source": "vicon", "standby": "world_position"}
-    ros.launch("nmpc_control", "control.launch", vehicle="dji_hil", **sources)
+    ros.launch("nmpc_control", "control.launch", vehicle="dji_hil", simulated=True, **sources)
     for node in ("nmpc_controller", "flight_guard"):
         ros.wait_for_node(f"/{node}")
     seen = ros.run_json("vicon_client.py", timeout=120)

@@ -76,6 +76,7 @@ def _session(folder: Path, plant: str) -> Iterator[Dict[str, str]]:
             "control.launch",
             vehicle,
             "scenario:=multi_obstacle",
+            "simulated:=true",
         ],
     )
     started: List[subprocess.Popen] = []
