@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: MIT
+"""The guard's own watchdogs over a flight: switch, battery, position, tilt, landing, its loop."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from flight_stub import LIMITS, PARAMS, TICK, VEHICLE, Aircraft, Flight, make_plan
+
+from nmpc_control.dji import RcMode
+from nmpc_control.guard import Guard
+from nmpc_control.guard_data import Action
+from nmpc_control.ladder import Rung
+from nmpc_control.mode_inputs import Mode, Request
+from nmpc_control.state import Goal
+
+SWITCH = dataclasses.replace(
+    PARAMS, modes=dataclasses.replace(PARAMS.modes, needs_switch=True, battery_time=0.5)
+)
+
+
+def with_battery(action):
+    modes = dataclasses.replace(PARAMS.modes, battery_action=action, battery_time=0.5)
+    return dataclasses.replace(PARAMS, modes=modes)
+
+
+def cruise(t, x):
+    return make_plan(x, t), Goal.TRAJECTORY
+
+
+def hover(t, x):
+    return make_plan(x, t), Goal.HOLD
+
+
+def actions_of(flight):
+    return [action for _, _, output in flight.log for action in output.actions]
+
+
+# the switch
+
+
+def test_a_switch_that_stands_in_f_from_the_beginning_starts_nothing():
+    flight = Flight(params=SWITCH)
+    flight.run(1.0)
+    assert "take it away and back" in flight.tick(Request.START).answer[1]
+    flight.run(0.2, rc=RcMode.P)
+    flight.run(0.2)
+    assert flight.tick(Request.START).answer == (True, "taking off")
+
+
+@pytest.mark.parametrize("lost", [{"rc_age": 1.0}, {"rc": RcMode.OFF}])
+def test_after_the_rc_was_lost_its_switch_must_be_seen_to_move_again(lost):
+    flight = Flight(params=SWITCH, aircraft=Aircraft().airborne([0.0, 0.0, 5.0]))
+    flight.run(0.5, rc=RcMode.P)
+    flight.run(0.5)
+    flight.tick(Request.START)
+    assert flight.run(2.0).mode is Mode.HOVERING
+    flight.run(0.5, **lost)
+    flight.run(0.5)
+    assert "take it away and back" in flight.tick(Request.START).answer[1]
+    flight.run(0.1, rc=RcMode.A)
+    assert flight.tick().mode is not Mode.MANUAL
+    assert flight.tick(Request.START).answer == (True, "braking to hover")
+
+
+def test_the_pilots_own_takeover_counts_as_having_been_away():
+    flight = Flight(params=SWITCH, aircraft=Aircraft().airborne([0.0, 0.0, 5.0]))
+    flight.run(0.5, rc=RcMode.P)
+    flight.run(0.5)
+    flight.tick(Request.START)
+    flight.run(2.0)
+    assert flight.tick(rc=RcMode.P).mode is Mode.MANUAL
+    flight.run(0.5)
+    assert flight.tick(Request.START).answer == (True, "braking to hover")
+
+
+# preflight
+
+
+def test_a_launch_that_must_not_start_says_why_and_never_does():
+    flight = Flight()
+    flight.guard = Guard(PARAMS, VEHICLE, LIMITS, "the thrust map is a simulator's")
+    output = flight.run(1.0)
+    assert (output.mode, output.reason) == (Mode.WAITING, "the thrust map is a simulator's")
+    assert flight.tick(Request.START).answer == (
+        False,
+        "not started: the thrust map is a simulator's",
+    )
+
+
+def test_a_position_that_jumps_on_the_ground_stands_against_a_start_for_a_while():
+    flight = Flight()
+    flight.run(1.0)
+    flight.aircraft.x[0] = 8.0
+    assert "the position jumps" in flight.run(0.5).reason
+    assert flight.run(8.0).mode is Mode.READY
+
+
+# in flight
+
+
+def test_a_jump_of_the_position_is_braked_and_flown_on_after():
+    flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
+    flight.aircraft.x[:2] += 4.0
+    output = flight.tick()
+    assert (output.mode, output.code) == (Mode.BRAKING, "alarm")
+    assert "from where the velocity leads" in output.reason
+    assert flight.run(4.0).mode is Mode.HOVERING
+
+
+def test_a_tilt_beyond_what_dji_ever_flies_is_braked_and_then_given_up():
+    flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
+    seen = []
+    for _ in range(40):
+        flight.aircraft.x[3] = 1.0
+        output = flight.tick()
+        seen.append((output.mode, output.code))
+    assert seen[0] == (Mode.BRAKING, "alarm")
+    assert seen[-1] == (Mode.RELEASED, "tilt")
+
+
+def test_landing_is_no_brake():
+    flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
+    flight.aircraft.serve = lambda actions: None  # DJI's landing does not begin yet
+    output = flight.tick(Request.LAND)
+    assert (output.mode, output.rung, output.code) == (Mode.LANDING, Rung.LANDING, "asked")
+
+
+def test_a_slow_loop_is_known():
+    flight = Flight()
+    flight.run(2.0)
+    loop = flight.guard.situation.loop
+    assert loop.rate == pytest.approx(1.0 / TICK)
+    assert loop.late == 0.0
+
+
+# the battery
+
+
+def low(flight, percent=0.18):
+    flight.change = {"battery": percent}
+
+
+def test_a_low_battery_sends_it_home_once_and_lands_there():
+    flight = Flight(params=with_battery("return")).hovering()
+    flight.aircraft.airborne([0.0, 0.0, 5.0])
+    flight.run(4.0)
+    flight.aircraft.x[:2] = [30.0, -4.0]
+    flight.run(5.0)
+    flight.solver = cruise
+    low(flight)
+    output = flight.run(1.0)
+    assert output.mode is Mode.FLYING
+    assert "the battery is at 18%: return" in output.reason
+    returns = [o for _, _, o in flight.log if Action.RETURN in o.actions]
+    assert len(returns) == 1
+    assert returns[0].target == pytest.approx((0.0, 0.0, 5.0), abs=0.1)
+    flight.solver = hover  # it is there
+    flight.guard.situation.home = flight.aircraft.x[:3].copy()
+    flight.run(0.5)
+    assert Action.LAND in actions_of(flight)
+    assert flight.log[-1][2].mode in (Mode.WAITING, Mode.READY)
+
+
+def test_a_return_that_takes_too_long_lands_where_it_is():
+    params = with_battery("return")
+    params = dataclasses.replace(
+        params, modes=dataclasses.replace(params.modes, return_timeout=1.0)
+    )
+    flight = Flight(params=params, aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
+    flight.solver = cruise
+    low(flight)
+    flight.run(1.2)
+    assert Action.LAND not in actions_of(flight)
+    flight.run(0.5)
+    assert Action.LAND in actions_of(flight)
+
+
+@pytest.mark.parametrize(
+    ("action", "percent", "expected"),
+    [
+        ("land", 0.18, Action.LAND),
+        ("hover", 0.18, Action.HOLD),
+        ("hover", 0.10, Action.LAND),
+        ("return", 0.10, Action.LAND),
+    ],
+)
+def test_what_a_low_battery_does(action, percent, expected):
+    flight = Flight(params=with_battery(action), aircraft=Aircraft().airborne([0.0, 0.0, 5.0]))
+    flight.hovering()
+    flight.solver = cruise
+    low(flight, percent)
+    flight.run(0.6)
+    assert expected in actions_of(flight)
+    assert (Action.LAND in actions_of(flight)) == (expected is Action.LAND)
+
+
+def test_twin_a_battery_that_sags_for_a_moment_does_nothing():
+    flight = Flight(params=with_battery("land"), aircraft=Aircraft().airborne([0.0, 0.0, 5.0]))
+    flight.hovering()
+    for _ in range(5):
+        flight.run(0.4, battery=0.1)
+        flight.run(0.1)
+    assert flight.log[-1][2].mode is Mode.HOVERING
+    flight.run(1.0, battery=math.nan)
+    assert flight.log[-1][2].mode is Mode.HOVERING
+    assert Action.LAND not in actions_of(flight)
+
+
+# durations on a steady clock
+
+
+def test_a_step_of_the_stamping_clock_does_not_end_a_take_off():
+    flight = Flight()
+    tick = flight.guard.tick
+    steady = [0.0]
+
+    def with_steady(inputs):
+        steady[0] += TICK
+        return tick(dataclasses.replace(inputs, steady=steady[0]))
+
+    flight.guard.tick = with_steady
+    flight.run(1.0)
+    flight.aircraft.serve = lambda actions: setattr(flight.aircraft, "authority", True)
+    flight.tick(Request.START)
+    flight.t += 1000.0
+    assert flight.run(1.0).mode is Mode.TAKING_OFF
+    assert flight.run(30.0).mode is Mode.FAULT
+
+
+def test_home_is_where_automatic_flight_began():
+    flight = Flight(aircraft=Aircraft().airborne([3.0, 4.0, 5.0])).hovering()
+    assert np.allclose(flight.guard.situation.home[:2], [3.0, 4.0], atol=0.1)
