@@ -19,7 +19,7 @@ from nmpc_control.augmented import MAXIMA, SUMS
 from nmpc_control.compiled_function import Buffered, compile_functions
 from nmpc_control.newton_step import Step, StepModel, left_to_gain
 from nmpc_control.ocp import PARTS, Instance, Structure
-from nmpc_control.riccati import NZ, SUMMARY, backward
+from nmpc_control.riccati import NZ, backward
 from nmpc_control.rollout import forward, settle
 from nmpc_control.solution import Guess, Solution, cold_guess, no_solution, worst_violation
 from nmpc_control.state import NU, NX, YAW
@@ -209,28 +209,23 @@ class SqpSolver:
         self._arrays["clamping"][0, 0] = 1.0
         if model.newton:
             self._backward_exact()
-            if self._row("pivot") > _LEAST_PIVOT and self._descends():
+            step = self._step(exact=True)
+            if step.pivot > _LEAST_PIVOT and step.descends(self.tolerance):
                 model.refusals = 0
-                return self._step(exact=True)
+                return step
             model.refused()
         self._backward()
-        if not self._descends():
-            # sent to bounds one by one, inputs can together do harm: then only hold those on one
-            self._arrays["clamping"][0, 0] = 0.0
-            self._backward()
+        step = self._step()
+        if step.descends(self.tolerance):
+            return step
+        # sent to bounds one by one, inputs can together do harm: then only hold those on one
+        self._arrays["clamping"][0, 0] = 0.0
+        self._backward()
         return self._step()
 
-    def _row(self, name: str) -> float:
-        return float(self._arrays["summary"][SUMMARY.index(name), 0])
-
-    def _descends(self) -> bool:
-        """Whether the step lowers the cost and its model, or there is nothing to lower."""
-        slope, promise, residual = self._arrays["summary"][:3, 0].tolist()
-        return (slope < 0.0 and promise > 0.0) or residual <= self.tolerance
-
     def _step(self, exact: bool = False) -> Step:
-        slope, promise, residual, active, _, changed = self._arrays["summary"][:, 0].tolist()
-        return Step(promise, slope, residual, int(active), changed > 0, exact)
+        slope, promise, residual, active, pivot, changed = self._arrays["summary"][:, 0].tolist()
+        return Step(promise, slope, residual, int(active), changed > 0, exact, pivot)
 
     def _search(self, cost: float, step: Step) -> Tuple[Optional[float], float]:
         """Take the longest of the tried steps that lowers the cost enough.
