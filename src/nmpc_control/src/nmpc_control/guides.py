@@ -67,8 +67,8 @@ def way_round(
         if not out.max() < _FARTHEST:
             return None
         smooth = (out - apart).max(axis=1)
-        if np.array_equal(smooth, push):
-            return path + push[:, None] * side
+        if np.all(smooth < push + _BEYOND / 2.0):  # never less: each round pushes on
+            return path + smooth[:, None] * side
         push = smooth
     return None
 
