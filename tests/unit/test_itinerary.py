@@ -94,6 +94,35 @@ def test_a_suspended_goal_goes_on_where_it_was(itinerary):
     assert itinerary.outcome.arrived
 
 
+def test_a_goal_suspended_again_and_again_is_given_up(itinerary):
+    """As where the guard brakes for what the solver does not see."""
+    itinerary.begin(0.0, line(START, END, speed=1.5))
+    patience, given_up = itinerary.flight.patience, None
+    for t in np.arange(0.0, patience + 20.0, 0.1):
+        if t % 1.5 < 1.0:
+            itinerary.suspend(START, 0.0)
+        else:
+            itinerary.resume(t)
+        itinerary.update(t, START, REST)
+        if itinerary.outcome is not None:
+            given_up = t
+            break
+    assert given_up == pytest.approx(patience, abs=2.0)
+    assert "held up" in itinerary.outcome.message
+    itinerary.resume(given_up + 1.0)
+    assert itinerary.goal is Goal.HOLD
+
+
+def test_a_new_goal_has_all_of_the_patience(itinerary):
+    patience = itinerary.flight.patience
+    itinerary.go_to(0.0, np.zeros(3), 0.0, START, 0.0)
+    itinerary.update(0.0, np.zeros(3), REST, held_up=True)
+    itinerary.update(0.9 * patience, np.zeros(3), REST, held_up=True)
+    itinerary.go_to(0.9 * patience, np.zeros(3), 0.0, END, 0.0)
+    itinerary.update(1.8 * patience, np.zeros(3), REST, held_up=True)
+    assert itinerary.goal is Goal.APPROACH
+
+
 def test_resume_without_a_suspended_goal_changes_nothing(itinerary):
     itinerary.resume(3.0)
     assert itinerary.goal is Goal.HOLD
@@ -114,10 +143,13 @@ def test_held_up_by_obstacles_time_does_not_press_but_patience_ends(itinerary):
         itinerary.update(t, np.zeros(3), REST, held_up=True)
     assert patience > leg + itinerary.flight.arrival_timeout + 10.0
     assert itinerary.goal is Goal.APPROACH
-    itinerary.update(patience, np.zeros(3), REST, held_up=False)
-    itinerary.update(patience + 0.1, np.zeros(3), REST, held_up=True)
-    assert itinerary.goal is Goal.APPROACH, "once free, patience begins anew"
-    itinerary.update(2.0 * patience + 0.2, np.zeros(3), REST, held_up=True)
+    for t in np.arange(patience, patience + 4.0, 0.1):
+        itinerary.update(t, np.zeros(3), REST, held_up=False)
+    itinerary.update(patience + 4.0, np.zeros(3), REST, held_up=True)
+    assert itinerary.goal is Goal.APPROACH, "once it went on, patience begins anew"
+    itinerary.update(2.0 * patience + 3.9, np.zeros(3), REST, held_up=True)
+    assert itinerary.goal is Goal.APPROACH
+    itinerary.update(2.0 * patience + 4.1, np.zeros(3), REST, held_up=True)
     assert itinerary.goal is Goal.HOLD
     assert "held up" in itinerary.outcome.message
     held = itinerary.reference(np.array([500.0]))[0, POSITION]
