@@ -75,9 +75,7 @@ def main() -> None:
     obstacles.publish(
         header,
         [
-            Obstacle(
-                o.id, SHAPES[o.shape], list(o.size), Point(*o.position), Vector3(), [], 0.0, 0.0
-            )
+            Obstacle(id=o.id, shape=SHAPES[o.shape], size=list(o.size), position=Point(*o.position))
             for o in scenario.obstacles
         ],
     )

@@ -131,8 +131,8 @@ def test_what_is_remembered_is_forgotten_outside():
     assert Inside(fence=0.5).since(before).fence == 0.3
 
 
-def creeping(towards, speed=0.03, seconds=25.0):
-    """Fly on plans that creep on (3,); returns the flight, and the positions (n, 3)."""
+def creeping(towards, speed=0.05):
+    """Return a flight on plans that creep on in a direction (3,) at a speed [m/s]."""
     flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
     flight.change = {"gps_health": 0}
     direction = np.array(towards, dtype=float)
@@ -155,10 +155,10 @@ def test_creeping_inside_the_minimum_is_bounded(monkeypatch, remembers):
     if not remembers:
         monkeypatch.setattr(verdict_module.Inside, "since", lambda self, before: self)
     flight = creeping([1.0, 0.0, 0.0])
-    ball = sphere([1.3, 0.0, 5.0])  # 0.3 m off
+    ball = sphere([1.21, 0.0, 5.0])  # 0.21 m off
     flight.obstacles = (ball,)
     least = []
-    for _ in range(20):
+    for _ in range(11):
         flight.run(1.0)
         least.append(float(ball.distance(flight.aircraft.x[:3])) - VEHICLE.radius)
     floor = CHECK.minimum_clearance - CHECK.growth_tolerance
@@ -171,6 +171,6 @@ def test_creeping_out_of_the_fence_is_bounded(monkeypatch, remembers):
         monkeypatch.setattr(verdict_module.Inside, "since", lambda self, before: self)
     flight = creeping([0.0, 1.0, 0.0])
     flight.guard.ladder.limits = dataclasses.replace(LIMITS, fence_max=np.array([9.0, 0.05, 99.0]))
-    flight.run(20.0)
+    flight.run(10.0)
     farthest = max(inputs.estimate.vector[1] for _, inputs, _ in flight.log) - 0.05
     assert bool(farthest < CHECK.growth_tolerance + 0.05) is remembers

@@ -63,3 +63,8 @@ def test_a_switch_that_leaves_f_between_two_ticks_is_not_missed(inbox):
     inbox.add_rc(1.015, f)
     assert inbox.inputs(1.02).telemetry.rc is RcMode.P
     assert inbox.inputs(1.04).telemetry.rc is RcMode.F
+
+
+def test_that_obstacles_are_not_known_well_enough_stays_until_it_is_taken_back(inbox):
+    inbox.obstacles_stale = "/tracker is silent"
+    assert [inbox.inputs(t).obstacles_stale for t in (1.0, 1.02)] == ["/tracker is silent"] * 2

@@ -38,23 +38,39 @@ ROS = {
 GUARD = [
     f"nmpc_control.{name}"
     for name in (
+        "clearance_check",
         "config",
         "dji",
         "errors",
         "estimator",
         "guard",
         "modes",
+        "override",
+        "obstacle_memory",
         "params",
         "plan_check",
         "plan_consistency",
         "prediction",
         "rotations",
+        "sent_inputs",
         "state",
+        "stopping",
+        "verdict",
     )
 ]
 SAFETY = {
     f"nmpc_control.{n}"
-    for n in ("dji", "estimator", "guard", "modes", "plan_check", "plan_consistency")
+    for n in (
+        "clearance_check",
+        "dji",
+        "estimator",
+        "guard",
+        "modes",
+        "override",
+        "plan_check",
+        "plan_consistency",
+        "stopping",
+    )
 }
 MATHEMATICS = {
     f"nmpc_control.{n}"

@@ -301,7 +301,7 @@ def test_a_plan_is_judged_by_where_its_inputs_lead_this_aircraft():
     beside[1] += 0.9
     _, plan = flying_east(speed=2.0)
     plan = dataclasses.replace(plan, states=plan.states + (beside - state))
-    ball = sphere(state[:3] + [4.0, -0.3, 0.0], radius=0.4)
+    ball = sphere(state[:3] + [2.0, -0.3, 0.0], radius=0.4)
     assert ball.distance(plan.states[:, :3]).min() - VEHICLE.radius > CHECK.minimum_clearance
     assert check(plan, state=state, obstacles=[ball]).finding is Finding.COLLISION
     assert check(plan, state=beside, obstacles=[ball]).ok

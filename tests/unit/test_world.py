@@ -111,6 +111,7 @@ def test_skipping_far_obstacles_changes_no_clearance():
         ({**SPHERE, "position": [0, 0]}, "a list of 3 numbers"),
         ({**WALL, "size": 3}, "a list of 3 numbers"),
         ({**SPHERE, "id": 7}, "id: got 7"),
+        ({**SPHERE, "id": "ground"}, "id: got 'ground'"),
         ("ball", "a mapping"),
     ],
 )

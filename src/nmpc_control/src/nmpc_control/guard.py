@@ -152,8 +152,7 @@ class Guard:
             return ""
         was_active = self.override.active
         state = None if i.estimate is None else self._state_in_effect(i)
-        plan = self.ladder.flown
-        reason = self.override.reason(i.t, i.obstacles_stale, state, obstacles, plan, verdict)
+        reason = self.override.reason(i.t, i.obstacles_stale, state, obstacles, verdict)
         if reason and not was_active:
             self._brake.begin(self._sent.last(i.t, i.estimate))
         return reason
@@ -290,6 +289,5 @@ class Guard:
     def _sentence(self, seen: ModeInputs, verdict: Verdict) -> str:
         if self.mode is Mode.WAITING:
             return "; ".join(preflight(seen, self.params.modes)) or self._reason
-        if self.mode not in PLANNED:
-            return self._reason
-        return self.override.remark or verdict.sentence
+        planned = self.override.remark or verdict.sentence
+        return planned if self.mode in PLANNED else self._reason

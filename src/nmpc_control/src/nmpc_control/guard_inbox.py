@@ -22,6 +22,7 @@ class GuardInbox:
     def __init__(self, params: GuardParameters) -> None:
         self.estimator = Estimator()
         self.obstacles: Sequence[Obstacle] = ()
+        self.obstacles_stale = ""  # why they are not known well enough
         self.authority = False  # as far as the last answer of dji_sdk tells
         self.failure = ""  # how a service call failed, until the next tick
         self.request: Optional[Request] = None
@@ -90,4 +91,14 @@ class GuardInbox:
         (plan, goal), error = self._plan or (None, Goal.HOLD), self._plan_error
         self._plan, self._plan_error, self.failure, self.request = None, "", "", None
         self._left_f = None
-        return GuardInputs(t, telemetry, estimate, self._height, plan, error, goal, self.obstacles)
+        return GuardInputs(
+            t=t,
+            telemetry=telemetry,
+            estimate=estimate,
+            height=self._height,
+            plan=plan,
+            plan_error=error,
+            goal=goal,
+            obstacles=self.obstacles,
+            obstacles_stale=self.obstacles_stale,
+        )

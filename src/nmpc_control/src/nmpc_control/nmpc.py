@@ -147,6 +147,11 @@ class Nmpc:
             between=not paper,
         )
 
+    @property
+    def left_out(self) -> int:
+        """Number of obstacles in reach that found no slot in the last solve."""
+        return self._slots.left_out
+
     def as_plan(self, t: float, solution: Solution, remark: str = "") -> Plan:
         """Return a solution as plan of time ``t`` [s], its status with a remark."""
         return Plan(

@@ -13,7 +13,7 @@ import numpy as np
 from nmpc_control.braking import BrakeParameters
 from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.params import Vehicle
-from nmpc_control.state import GRAVITY, VELOCITY, Plan
+from nmpc_control.state import GRAVITY, VELOCITY
 from nmpc_control.stopping import StoppingParameters, clearance_of, shortfall, way_to_stop
 from nmpc_control.verdict import PlanCheckParameters, Verdict
 
@@ -75,7 +75,6 @@ class Override:
         stale: str,
         state: Optional[np.ndarray],
         obstacles: ObstacleField,
-        plan: Optional[Plan],
         verdict: Verdict,
     ) -> str:
         """Return why to brake at ``t`` [s]; empty: the plan may be flown.
@@ -85,11 +84,10 @@ class Override:
             stale: why the obstacles are not known well enough; empty: they are.
             state: (10,) when a command sent now takes effect; None: unknown.
             obstacles: as known now.
-            plan: that would be flown, with the states to which it leads.
-            verdict: on this plan, now.
+            verdict: now, on the plan that would be flown.
         """
         self.remark = ""
-        reason = stale or self._no_room(t, state, obstacles, plan, verdict)
+        reason = stale or self._no_room(t, state, obstacles, verdict)
         if reason and (stale or not self.active):
             self._until = t + self.params.dwell
         self._reason = reason or self._reason
@@ -101,22 +99,21 @@ class Override:
         t: float,
         state: Optional[np.ndarray],
         obstacles: ObstacleField,
-        plan: Optional[Plan],
         verdict: Verdict,
     ) -> str:
         p = self.params
-        if not p.enabled or state is None or plan is None or obstacles.unusable:
+        if not p.enabled or state is None or verdict.flown is None or obstacles.unusable:
             return ""
         if float(np.linalg.norm(state[VELOCITY])) < p.least_speed:
             return ""
-        age = max(0.0, t - plan.t)
+        age = max(0.0, t - verdict.flown.t)
         way = way_to_stop(state, self.vehicle, self.brake, self.period + age, p.factor)
         in_effect, radius = t + self.vehicle.delay, self.vehicle.radius
         room = p.release if self.active else 0.0
         found = shortfall(way, in_effect, obstacles, radius, p.margin, room)
         if found is None:
             return ""
-        kept = self._kept(in_effect, age, plan, verdict, obstacles)
+        kept = self._kept(in_effect, age, verdict, obstacles)
         gain = self.brake_clearance(state, in_effect, obstacles) - kept
         if self.active:
             gain += 2.0 * p.advantage
@@ -125,9 +122,7 @@ class Override:
         self.remark = f"{found}; the plan keeps {kept:.2f} m"
         return ""
 
-    def _kept(
-        self, t: float, age: float, plan: Plan, verdict: Verdict, obstacles: ObstacleField
-    ) -> float:
+    def _kept(self, t: float, age: float, verdict: Verdict, obstacles: ObstacleField) -> float:
         """Return how far [m] from obstacles one stays who flies the plan.
 
         One that has just come and leads past them at a good distance is taken at its word. Of any
@@ -139,5 +134,5 @@ class Override:
         if leads_past and age <= p.evasion_age:
             return verdict.nearest
         later = t + max(0.0, self.plan_timeout - age)
-        after = self.brake_clearance(plan.state_at(later), later, obstacles)
+        after = self.brake_clearance(verdict.flown.state_at(later), later, obstacles)
         return min(verdict.nearest, after)

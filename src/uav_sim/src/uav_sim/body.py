@@ -92,6 +92,9 @@ class PathBody(Body):
     def track(self, t0: float) -> Track:
         """Return the samples between which it was straight to within ``CHORD_TOLERANCE``."""
         path, since = self._path, self.since
+        if self.max_speed == 0.0:  # most obstacles, at every step that comes nearer
+            place = self.obstacle.position
+            return Track(((max(t0, since), place), (self.t, place)), 0.0)
         begin, end, bend = max(t0 - since, 0.0), self.t - since, 0.0
         times = [begin, *path.kinks(begin, end), end]
         if self._bend > 0.0:

@@ -14,6 +14,7 @@ from uav_sim.errors import ConfigError
 from uav_sim.motion import STILL, Appear, Line, Motion, Vector
 from uav_sim.motion_entry import load_appear, load_motion
 
+GROUND = "ground"  # id of the collision that a crash on the ground is; no obstacle's
 # Keys that give the size [m] of each shape, with how many numbers each.
 _SIZE_KEYS = {
     "sphere": (("radius", 1),),
@@ -123,8 +124,8 @@ def _load(item: Any, source: str, key: str) -> Obstacle:
     for name in ("id", "position", *names):
         if name not in item:
             raise ConfigError(source, f"{key}.{name}", None, "a value, but the key is missing")
-    if not isinstance(item["id"], str) or not item["id"]:
-        raise ConfigError(source, f"{key}.id", item["id"], "a name")
+    if not isinstance(item["id"], str) or item["id"] in ("", GROUND):
+        raise ConfigError(source, f"{key}.id", item["id"], f"a name, and not {GROUND!r}")
     size = []
     for name, length in size_keys:
         value = item[name] if length > 1 else [item[name]]

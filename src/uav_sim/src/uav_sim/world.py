@@ -13,10 +13,8 @@ from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Union
 
 from uav_sim.body import Body, BodyState, between
 from uav_sim.motion import Vector
-from uav_sim.obstacle import Obstacle
+from uav_sim.obstacle import GROUND, Obstacle
 from uav_sim.scene import Scene
-
-GROUND = "ground"  # id of the collision that a crash on the ground is
 
 
 class Collision(NamedTuple):

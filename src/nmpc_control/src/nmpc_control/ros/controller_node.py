@@ -7,7 +7,7 @@ ROS Subscribers:
     dji_sdk/attitude, dji_sdk/imu, dji_sdk/velocity, dji_sdk/local_position: the state.
     nmpc/status (nmpc_msgs/ControllerStatus): mode of the guard and the input really sent.
     nmpc/hold_request (std_msgs/Empty): drop the goal and hold position.
-    obstacles (nmpc_msgs/ObstacleArray): joined by id with those of the scenario.
+    obstacles, nmpc/forget_obstacles: see ``obstacle_port`` and ``obstacle_services``.
     command/pose (geometry_msgs/PoseStamped): go to this point.
 ROS Action: fly_trajectory (nmpc_msgs/FlyTrajectory).
 ROS Publishers: see ``publishers``.
@@ -16,7 +16,8 @@ ROS Parameters:
     scenario's own.
     ~scenario (str): name or path of a scenario that is offered beside the named ones.
     ~backend (str): compiled or ipopt. ~avoidance (bool): false removes the obstacle term.
-    ~frame_id (str): world frame. ~base_frame (str): body frame.
+    ~frame_id (str): world frame. ~base_frame (str): body frame, default base_link below the
+    node's namespace, so that several vehicles share one tree of frames.
 """
 
 import queue
@@ -24,26 +25,26 @@ import sys
 import traceback
 from collections import deque
 from dataclasses import replace
-from typing import Callable, Deque, Dict, Optional, Sequence, Tuple
+from typing import Callable, Deque, Dict, Optional, Tuple
 
 import numpy as np
 import rospy
 from geometry_msgs.msg import PointStamped, PoseStamped, QuaternionStamped, Vector3Stamped
 from sensor_msgs.msg import Imu
-from std_msgs.msg import Empty, Header
+from std_msgs.msg import Empty, Header, String
 
 from nmpc_control.controller import Controller
 from nmpc_control.errors import ConfigError, NmpcError
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters, load_parameters, load_weights
-from nmpc_control.ros.conversions import MessageError, obstacles_from_msg
+from nmpc_control.ros.obstacle_port import ObstaclePort
 from nmpc_control.ros.publishers import Publishers
 from nmpc_control.ros.subscriptions import Subscriptions
 from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
 from nmpc_control.rotations import rpy_from_quaternion
 from nmpc_control.scenario import Scenario, load_scenario
 from nmpc_control.state import POSITION, YAW, Goal
-from nmpc_msgs.msg import ControllerStatus, ObstacleArray
+from nmpc_msgs.msg import ControllerStatus
 
 _ENGAGED = (ControllerStatus.MODE_FLYING, ControllerStatus.MODE_HOVERING)
 
@@ -61,9 +62,10 @@ class ControllerNode:
         self._inputs: Deque[Tuple[float, Optional[Tuple[float, ...]]]] = deque(maxlen=200)
         self._requests: "queue.Queue[Callable[[float], None]]" = queue.Queue(maxsize=20)
         self._known: Dict[str, Obstacle] = {}  # of scenarios: a new goal does not remove them
-        self._heard: Dict[str, Obstacle] = {}
-        self._new_obstacles: Optional[Sequence[Obstacle]] = None
-        self.publishers = Publishers(self.frame_id, rospy.get_param("~base_frame", "base_link"))
+        self._port = ObstaclePort(self.frame_id, lambda: self.controller.nmpc.left_out)
+        base_frame = rospy.get_param("~base_frame", f"{rospy.get_namespace()}base_link".lstrip("/"))
+        self.publishers = Publishers(self.frame_id, base_frame)
+        self.publishers.add_diagnostics("obstacles", self._port.diagnose)
         self.action = TrajectoryAction(
             on_goal=lambda: self._request(self._accept_goal),
             on_cancel=lambda: self._request(self._cancel_goal),
@@ -104,7 +106,7 @@ class ControllerNode:
         """Forget everything that carries a time, as after a jump of the clock."""
         self.controller = Controller(self.parameters)
         self._inputs.clear()
-        self._join_obstacles()
+        self._port.start_anew()
         self.action.finish(rospy.Time.now().to_sec(), False, "the clock jumped backwards")
 
     def _tick(self, now: rospy.Time, misses: int) -> None:
@@ -114,10 +116,8 @@ class ControllerNode:
             self.controller.record_input(sent, None if u is None else np.array(u))
         while not self._requests.empty():
             self._requests.get_nowait()(t)
-        if self._new_obstacles is not None:
-            self._heard = {obstacle.id: obstacle for obstacle in self._new_obstacles}
-            self._new_obstacles = None
-            self._join_obstacles()
+        self.controller.obstacles, _ = self._port.look(t)
+        self.publishers.obstacles(t, self.controller.obstacles)
         pursued = self.controller.itinerary.goal is not Goal.HOLD
         clock_start = self.controller.itinerary.clock_start
         step = self.controller.step(t)
@@ -160,7 +160,9 @@ class ControllerNode:
     def _show(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self._known.update({obstacle.id: obstacle for obstacle in scenario.obstacles})
-        self._join_obstacles()
+        known = tuple(self._known.values())
+        self._port.set_known(known)
+        self.publishers.known_obstacles(known)
         self.publishers.trajectory(scenario, None)
         self.publishers.room(scenario.room)
 
@@ -212,12 +214,10 @@ class ControllerNode:
         except queue.Full:
             rospy.logwarn_throttle(1.0, "more requests than can be served: one dropped")
 
-    def _join_obstacles(self) -> None:
-        self.controller.obstacles = tuple({**self._known, **self._heard}.values())
-        self.publishers.obstacles(self.controller.obstacles)
-
     def _subscribe(self) -> None:
-        listen = Subscriptions().add
+        subscriptions = Subscriptions()
+        self._port.subscribe(subscriptions, known=False)
+        listen = subscriptions.add
 
         def on_attitude(m: QuaternionStamped) -> None:
             q = m.quaternion
@@ -242,12 +242,6 @@ class ControllerNode:
             known = m.setpoint_sent and np.all(np.isfinite(u))
             self._inputs.append((m.header.stamp.to_sec(), u if known else None))
 
-        def on_obstacles(m: ObstacleArray) -> None:
-            try:
-                self._new_obstacles = obstacles_from_msg(m, self.frame_id)
-            except MessageError as error:
-                rospy.logwarn_throttle(1.0, f"obstacles refused: {error}")
-
         listen("dji_sdk/attitude", QuaternionStamped, on_attitude)
         listen("dji_sdk/imu", Imu, on_imu)
         listen("dji_sdk/velocity", Vector3Stamped, on_velocity)
@@ -258,7 +252,7 @@ class ControllerNode:
             Empty,
             lambda m: self._request(lambda t: self._hold(t, "told to hold")),
         )
-        listen("obstacles", ObstacleArray, on_obstacles)
+        listen("nmpc/forget_obstacles", String, lambda m: self._port.forget(m.data), queue_size=10)
         listen("command/pose", PoseStamped, lambda m: self._request(lambda t: self._go_to(t, m)))
 
 

@@ -6,7 +6,7 @@ says in one line what is wrong. Nothing here reaches the solver, the guard uses 
 """
 
 import math
-from typing import Optional, Protocol, Sequence, Tuple
+from typing import Protocol, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -23,13 +23,12 @@ from nmpc_msgs.msg import ControlInput, ObstacleArray, Prediction
 from nmpc_msgs.msg import Obstacle as ObstacleMsg
 from nmpc_msgs.msg import Plan as PlanMsg
 
-MAX_OBSTACLES = 256  # [1] in one message
-_SHAPES = {
-    ObstacleMsg.SPHERE: ("sphere", 1),
-    ObstacleMsg.CYLINDER: ("cylinder", 2),
-    ObstacleMsg.BOX: ("box", 3),
+_MOST_POINTS = 20  # [1] of a path that is published
+_SHAPE_VALUES = {
+    "sphere": ObstacleMsg.SPHERE,
+    "cylinder": ObstacleMsg.CYLINDER,
+    "box": ObstacleMsg.BOX,
 }
-_SHAPE_VALUES = {name: value for value, (name, _) in _SHAPES.items()}
 
 
 class MessageError(NmpcError):
@@ -134,59 +133,31 @@ def odometry_to_msg(x: np.ndarray, header: Header, base_frame: str) -> Odometry:
     return message
 
 
-def obstacles_from_msg(
-    message: ObstacleArray, frame_id: Optional[str] = None
-) -> Tuple[Obstacle, ...]:
-    """Return the obstacles of a message; one that does not move carries no time.
-
-    Args:
-        message: as received.
-        frame_id: the frame that is expected; None accepts any.
-
-    Raises:
-        MessageError: another frame, too many, or one with impossible numbers: then none is taken.
-    """
-    if frame_id is not None:
-        _require_frame(message.header, frame_id)
-    if len(message.obstacles) > MAX_OBSTACLES:
-        raise MessageError(f"{len(message.obstacles)} obstacles, at most {MAX_OBSTACLES} are taken")
-    return tuple(_obstacle(o, message.header.stamp.to_sec()) for o in message.obstacles)
-
-
 def obstacles_to_msg(obstacles: Sequence[Obstacle], header: Header) -> ObstacleArray:
-    """Return a message of the obstacles where they are at the header's stamp."""
+    """Return a message of the obstacles where they are at the header's stamp.
+
+    Paths are given from then on, with at most 20 points; of one that stands still no velocity.
+    """
     t = header.stamp.to_sec()
-    return ObstacleArray(
-        header=header,
-        obstacles=[
-            ObstacleMsg(
-                id=obstacle.id,
-                shape=_SHAPE_VALUES[obstacle.shape],
-                size=list(obstacle.size),
-                position=Point(*obstacle.position_at(t)),
-                velocity=Vector3(*obstacle.velocity),
-            )
-            for obstacle in obstacles
-        ],
+    return ObstacleArray(header=header, obstacles=[_obstacle_to_msg(o, t) for o in obstacles])
+
+
+def _obstacle_to_msg(obstacle: Obstacle, t: float) -> ObstacleMsg:
+    message = ObstacleMsg(
+        id=obstacle.id,
+        shape=_SHAPE_VALUES[obstacle.shape],
+        size=list(obstacle.size),
+        position=Point(*obstacle.position_at(t)),
     )
-
-
-def _obstacle(message: ObstacleMsg, stamp: float) -> Obstacle:
-    shape, length = _SHAPES.get(message.shape, (None, 0))
-    if shape is None:
-        raise MessageError(f"obstacle {message.id!r} with unknown shape {message.shape}")
-    size = np.array(message.size, dtype=float)
-    position = np.array([message.position.x, message.position.y, message.position.z])
-    velocity = np.array([message.velocity.x, message.velocity.y, message.velocity.z])
-    if len(size) != length or not (np.isfinite(size).all() and (size > 0.0).all()):
-        expected = f"{length} positive number{'s' if length > 1 else ''}"
-        raise MessageError(f"{shape} {message.id!r} with size {size.tolist()}, expected {expected}")
-    if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
-        raise MessageError(f"{shape} {message.id!r} with position or velocity that is not finite")
-    moves = bool(velocity.any())
-    if moves and stamp <= 0.0:
-        raise MessageError(f"{shape} {message.id!r} moves, but its message has no stamp")
-    return Obstacle(message.id, position, size, shape, velocity, stamp if moves else None)
+    if obstacle.stamp is not None:
+        message.velocity = Vector3(*obstacle.velocity)
+        message.uncertainty_growth = obstacle.growth
+        if obstacle.path is not None:
+            stride = -(-len(obstacle.path) // _MOST_POINTS)
+            message.predicted_dt = stride * obstacle.path_dt
+            ahead = np.arange(1, len(obstacle.path) // stride + 1) * message.predicted_dt
+            message.predicted_path = [Point(*p) for p in obstacle.position_at(t + ahead)]
+    return message
 
 
 def _pose(x: np.ndarray) -> Pose:

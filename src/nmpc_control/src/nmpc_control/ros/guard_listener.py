@@ -4,7 +4,7 @@
 ROS Subscribers:
     dji_sdk/{attitude, imu, velocity, local_position, gps_health, rc, flight_status, battery_state,
     height_above_takeoff}, or ``world_position`` instead of local_position: telemetry.
-    nmpc/plan (nmpc_msgs/Plan), nmpc/obstacles (nmpc_msgs/ObstacleArray): from nmpc_controller.
+    nmpc/plan (nmpc_msgs/Plan): from nmpc_controller. Obstacles: see ``obstacle_port``.
 """
 
 import math
@@ -20,9 +20,10 @@ from nmpc_control.guard_data import GuardInputs
 from nmpc_control.guard_inbox import GuardInbox
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.mode_inputs import Request
-from nmpc_control.ros.conversions import MessageError, obstacles_from_msg, plan_from_msg
+from nmpc_control.ros.conversions import MessageError, plan_from_msg
+from nmpc_control.ros.obstacle_port import ObstaclePort
 from nmpc_control.ros.subscriptions import Subscriptions
-from nmpc_msgs.msg import ObstacleArray, Plan
+from nmpc_msgs.msg import Plan
 
 _POSITION_TOPICS = {"gps": "dji_sdk/local_position", "external": "world_position"}
 
@@ -34,9 +35,9 @@ class GuardListener:
         self.params = params
         self.avoidance = avoidance  # false leaves obstacles out of the plan check
         self.last_plan = Plan(reference_time=math.nan)  # as received; empty without
+        self.obstacles = ObstaclePort(params.world_frame)
         self._inbox = GuardInbox(params)
         self._lock = threading.Lock()
-        self._obstacles_heard = -math.inf  # [s]
         subscriptions = Subscriptions()
         for topic, kind, callback in (
             ("dji_sdk/attitude", QuaternionStamped, self._on_attitude),
@@ -49,19 +50,17 @@ class GuardListener:
             ("dji_sdk/height_above_takeoff", Float32, self._on_height),
             ("dji_sdk/battery_state", BatteryState, self._on_battery),
             ("nmpc/plan", Plan, self._on_plan),
-            ("nmpc/obstacles", ObstacleArray, self._on_obstacles),
         ):
             subscriptions.add(topic, kind, self._locked(callback))
+        self.obstacles.subscribe(subscriptions, known=True)
 
     def take(self, t: float, request: Optional[Request]) -> GuardInputs:
         """Return what a tick at ``t`` [s] sees, with the operator's request."""
         with self._lock:
+            if self.avoidance:
+                self._inbox.obstacles, self._inbox.obstacles_stale = self.obstacles.look(t)
             self._inbox.request = request
             return self._inbox.inputs(t)
-
-    def obstacle_age(self, t: float) -> float:
-        """Return the age [s] of the newest obstacle message; inf without."""
-        return t - self._obstacles_heard
 
     @property
     def authority(self) -> bool:
@@ -79,11 +78,11 @@ class GuardListener:
             self._inbox.failure = sentence
 
     def start_anew(self) -> None:
-        """Forget what was received before the clock jumped; authority and obstacles stay."""
+        """Forget what was received before the clock jumped; authority and what stands stay."""
+        self.obstacles.start_anew()
         with self._lock:
             old, self._inbox = self._inbox, GuardInbox(self.params)
-            self._inbox.authority, self._inbox.obstacles = old.authority, old.obstacles
-            self._obstacles_heard = -math.inf
+            self._inbox.authority = old.authority
 
     def rejected_samples(self) -> str:
         """Return how many samples of which source were refused."""
@@ -131,15 +130,6 @@ class GuardListener:
             self._inbox.add_plan(*plan_from_msg(message, self.params.world_frame))
         except MessageError as error:
             self._inbox.add_plan_error(str(error))
-
-    def _on_obstacles(self, message: ObstacleArray) -> None:
-        if not self.avoidance:
-            return
-        try:
-            self._inbox.obstacles = obstacles_from_msg(message, self.params.world_frame)
-            self._obstacles_heard = _now()
-        except MessageError as error:
-            rospy.logwarn_throttle(1.0, f"nmpc/obstacles refused: {error}")
 
 
 def _now() -> float:

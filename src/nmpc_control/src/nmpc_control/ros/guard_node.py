@@ -6,12 +6,15 @@ ROS Publishers:
     dji_sdk/flight_control_setpoint_generic (sensor_msgs/Joy): 50 Hz while automatic flight is on.
     nmpc/hold_request (std_msgs/Empty): tells the controller to drop its goal.
     nmpc/status, /diagnostics: see ``guard_reports``.
-ROS Services: start, hover, land, release (std_srvs/Trigger), answered with a reason in words.
+ROS Services: start, hover, land, release (std_srvs/Trigger), answered with a reason in words;
+    those of ``obstacle_services``.
 ROS Parameters:
     ~vehicle (str): file under config/vehicles.
     ~avoidance (bool): false leaves obstacles out of the plan check.
+    ~frame_id (str): world frame, instead of the one in ``config/guard.yaml``.
 """
 
+import gc
 import os
 import queue
 import signal
@@ -19,6 +22,7 @@ import sys
 import threading
 import time
 import traceback
+from dataclasses import replace
 from typing import Callable, Optional
 
 import rospy
@@ -35,12 +39,14 @@ from nmpc_control.params import load_parameters
 from nmpc_control.ros.dji_services import DjiServices
 from nmpc_control.ros.guard_listener import GuardListener
 from nmpc_control.ros.guard_reports import GuardReports
+from nmpc_control.ros.obstacle_services import ObstacleServices
 
 OVERSLEPT = 0.06  # [s] of wall time between two ticks: this process was not running
 CATCH_UP = 0.01  # [s] of wall time that callbacks then get
 CLOCK_STEP = 0.1  # [s] by which the clock may step back without being a jump
 HEAR_AGAIN = 0.1  # [s] of wall time for telemetry after a jump
 ANSWER_TIMEOUT = 2.0  # [s] wall time in which a tick must answer a service call
+SWITCH_INTERVAL = 5e-4  # [s] for which a thread that reads messages may keep the loop waiting
 NICENESS = -10  # ahead of solver, recorder and desktop, where the system allows it
 
 
@@ -58,6 +64,8 @@ class GuardNode:
         self.guard = guard
         self._listener = GuardListener(guard.params, avoidance)
         self._reports = GuardReports(guard, self._listener.rejected_samples)
+        self._reports.add("obstacles", self._listener.obstacles.diagnose)
+        self._obstacle_services = ObstacleServices(self._listener.obstacles)
         self._dji = DjiServices(self._listener.set_authority, self._listener.report_failure)
         self._questions: "queue.Queue[_Question]" = queue.Queue(maxsize=10)
         self._is_leaving = False
@@ -128,7 +136,7 @@ class GuardNode:
             question.answer = output.answer or (False, output.reason)
             question.answered.set()
             rospy.loginfo(f"{question.request.value}: {question.answer[1]}")
-        obstacle_age = self._listener.obstacle_age(t)
+        obstacle_age = self._listener.obstacles.age(t)
         self._reports.publish(now, inputs, output, self._listener.last_plan, obstacle_age)
 
     def _act(self, output: GuardOutput) -> None:
@@ -170,9 +178,13 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     _ask_for_priority()
+    sys.setswitchinterval(SWITCH_INTERVAL)
     try:
         guard = _guard()
-        GuardNode(guard, bool(rospy.get_param("~avoidance", True))).run()
+        node = GuardNode(guard, bool(rospy.get_param("~avoidance", True)))
+        gc.collect()
+        gc.freeze()  # or now and then a tick would wait until all modules were looked through again
+        node.run()
     except NmpcError as error:
         sys.exit(_refuse(str(error), 2))
     except KeyboardInterrupt:
@@ -183,6 +195,7 @@ def main() -> None:
 
 def _guard() -> Guard:
     params = load_guard_parameters()
+    params = replace(params, world_frame=rospy.get_param("~frame_id", params.world_frame))
     parameters = load_parameters(_vehicle_name())
     vehicle = parameters.vehicle
     if params.vertical_command == "thrust" and not vehicle.thrust_map.measured_on:

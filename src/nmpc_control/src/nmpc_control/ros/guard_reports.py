@@ -39,6 +39,10 @@ class GuardReports:
         self._updater.add("telemetry", self._diagnose_telemetry)
         self._updater.add("plans", self._diagnose_plans)
 
+    def add(self, name: str, diagnose: Callable[[Wrapper], Wrapper]) -> None:
+        """Have another entry in /diagnostics."""
+        self._updater.add(name, diagnose)
+
     def publish(
         self,
         now: rospy.Time,

@@ -78,7 +78,7 @@ def box_edges(frame: str, ns: str, low: np.ndarray, high: np.ndarray) -> Marker:
 
 
 def obstacle(frame: str, item: Obstacle, id: int, safety_distance: float) -> List[Marker]:
-    """Return the opaque obstacle and its shell, ``safety_distance`` [m] off its surface.
+    """Return the opaque obstacle, its path, and its shell, ``safety_distance`` [m] off its surface.
 
     The shell is what the aircraft's hull, not its centre, has to stay out of. An obstacle with
     numbers that cannot be drawn gives no marker.
@@ -103,6 +103,9 @@ def obstacle(frame: str, item: Obstacle, id: int, safety_distance: float) -> Lis
         marker.pose.position = item.position
         marker.scale = Vector3(*[edge + margin for edge in edges])
         markers.append(marker)
+    path = np.array([(p.x, p.y, p.z) for p in (item.position, *item.predicted_path)])
+    if len(path) > 1 and np.isfinite(path).all():
+        markers.append(line(frame, "obstacle paths", path, OBSTACLE, 0.03, id=id))
     return markers
 
 

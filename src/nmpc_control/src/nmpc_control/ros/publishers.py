@@ -3,10 +3,11 @@
 
 ROS Publishers: nmpc/plan, nmpc/prediction (every other plan), nmpc/reference, nmpc/odometry, and
 latched
-nmpc/trajectory, nmpc/obstacles, nmpc/room; tf world -> base_link; /diagnostics.
+nmpc/trajectory, nmpc/obstacles, nmpc/known_obstacles, nmpc/room; tf world -> base_link;
+/diagnostics.
 """
 
-from typing import Optional, Sequence, Tuple
+from typing import Callable, Optional, Sequence, Tuple
 
 import diagnostic_updater
 import numpy as np
@@ -43,6 +44,7 @@ from nmpc_msgs.msg import ObstacleArray, Plan, Prediction
 
 _SAMPLE_PERIOD = 0.05  # [s] of the published trajectory
 _MOST_SAMPLES = 5000
+_OBSTACLE_PERIOD = 0.1  # [s] least between two lists of obstacles
 
 
 class Publishers:
@@ -58,8 +60,13 @@ class Publishers:
             "nmpc/trajectory", MultiDOFJointTrajectory, queue_size=1, latch=True
         )
         self._obstacles = rospy.Publisher("nmpc/obstacles", ObstacleArray, queue_size=1, latch=True)
+        self._known = rospy.Publisher(
+            "nmpc/known_obstacles", ObstacleArray, queue_size=1, latch=True
+        )
         self._room = rospy.Publisher("nmpc/room", PolygonStamped, queue_size=1, latch=True)
         self._transforms = tf2_ros.TransformBroadcaster()
+        self._shown: Optional[Sequence[Obstacle]] = None
+        self._shown_at = 0.0  # [s]
         self._steps = 0
         self._last: Tuple[Optional[Step], int] = (None, 0)
         self._updater = diagnostic_updater.Updater()
@@ -84,6 +91,16 @@ class Publishers:
         self._transforms.sendTransform(
             TransformStamped(header, self.base_frame, Transform(translation, pose.orientation))
         )
+
+    def add_diagnostics(
+        self,
+        name: str,
+        diagnose: Callable[
+            [diagnostic_updater.DiagnosticStatusWrapper], diagnostic_updater.DiagnosticStatusWrapper
+        ],
+    ) -> None:
+        """Have another entry in /diagnostics."""
+        self._updater.add(name, diagnose)
 
     def diagnose(self, step: Optional[Step], misses: int) -> None:
         """Refresh /diagnostics, at most once a second."""
@@ -117,10 +134,19 @@ class Publishers:
             )
         self._trajectory.publish(message)
 
-    def obstacles(self, obstacles: Sequence[Obstacle]) -> None:
-        """Publish the obstacles that the controller knows."""
-        header = Header(stamp=rospy.Time.now(), frame_id=self.frame_id)
-        self._obstacles.publish(obstacles_to_msg(obstacles, header))
+    def obstacles(self, t: float, obstacles: Sequence[Obstacle]) -> None:
+        """Publish the obstacles that the controller knows at ``t`` [s], where they have changed."""
+        if obstacles is self._shown or 0.0 <= t - self._shown_at < _OBSTACLE_PERIOD:
+            return
+        self._shown, self._shown_at = obstacles, t
+        self._obstacles.publish(obstacles_to_msg(obstacles, self._header()))
+
+    def known_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
+        """Publish the obstacles of the scenarios, for the guard."""
+        self._known.publish(obstacles_to_msg(obstacles, self._header()))
+
+    def _header(self) -> Header:
+        return Header(stamp=rospy.Time.now(), frame_id=self.frame_id)
 
     def room(self, room: Optional[Tuple[np.ndarray, np.ndarray]]) -> None:
         """Publish the least and the greatest corner of the room."""

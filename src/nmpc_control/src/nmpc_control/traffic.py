@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""Other vehicles as obstacles: where each said that it would be, with the time at which it said so.
+
+One that falls silent is reported on with its last words, so that its radius grows and whoever reads
+it reacts to its silence; only after a long time it is left out, which is said.
+"""
+
+from dataclasses import dataclass, field
+from typing import Dict, List, Optional, Tuple
+
+import numpy as np
+
+from nmpc_control.obstacle import Obstacle
+
+LATER = 0.3  # [s] by which odometry must be newer than a prediction to replace it
+
+
+@dataclass(frozen=True)
+class TrafficParameters:
+    """What is assumed of other vehicles."""
+
+    radius: float = field(metadata={"min": 1e-2})  # [m] of the hull
+    growth: float = field(metadata={"min": 0.0})  # [m/s] of the radius with the age
+    forget_after: float = field(metadata={"min": 1e-2})  # [s] of silence
+
+
+@dataclass(frozen=True)
+class Course:
+    """What a vehicle says of itself."""
+
+    stamp: float  # [s] of the position
+    position: np.ndarray  # (3,) [m]
+    velocity: np.ndarray  # (3,) [m/s]
+    path: Optional[np.ndarray] = None  # (M, 3) [m] at stamp + (i + 1) * path_dt
+    path_dt: float = 0.0  # [s]
+
+
+class Traffic:
+    """Newest course of every other vehicle, in one frame."""
+
+    def __init__(self, params: TrafficParameters) -> None:
+        self.params = params
+        self._predicted: Dict[str, Course] = {}
+        self._measured: Dict[str, Course] = {}
+
+    def predict(self, name: str, course: Course) -> None:
+        """Take a vehicle's prediction."""
+        self._predicted[name] = course
+
+    def measure(self, name: str, course: Course) -> None:
+        """Take a vehicle's odometry, which counts where its prediction has ended."""
+        self._measured[name] = course
+
+    def report(self, t: float) -> Tuple[List[Obstacle], List[str]]:
+        """Return the vehicles as obstacles at ``t`` [s], and the names of those now left out."""
+        obstacles, gone = [], []
+        for name in sorted({*self._predicted, *self._measured}):
+            course = self._newest(name)
+            if t - course.stamp > self.params.forget_after:
+                self._predicted.pop(name, None)
+                self._measured.pop(name, None)
+                gone.append(name)
+                continue
+            path, path_dt = course.path, course.path_dt
+            if path is None and not course.velocity.any():
+                path, path_dt = course.position[None], 1.0  # or it would count as a thing for ever
+            obstacles.append(
+                Obstacle(
+                    id=name,
+                    position=course.position,
+                    size=np.array([self.params.radius]),
+                    velocity=course.velocity,
+                    stamp=course.stamp,
+                    path=path,
+                    path_dt=path_dt,
+                    growth=self.params.growth,
+                )
+            )
+        return obstacles, gone
+
+    def start_anew(self) -> None:
+        """Forget all, as after a jump of the clock."""
+        self._predicted.clear()
+        self._measured.clear()
+
+    def _newest(self, name: str) -> Course:
+        predicted, measured = self._predicted.get(name), self._measured.get(name)
+        if predicted is None or measured is None:
+            return predicted or measured
+        return measured if measured.stamp - predicted.stamp > LATER else predicted
