@@ -35,7 +35,11 @@ def judge(flight: Flight, row: Row, settings: Settings) -> Dict[str, Any]:
     """Return ``feasible`` and ``feasible_by`` of a row; None where it is not to be looked for."""
     if flight.sketch.is_closed:
         return {"feasible": False, "feasible_by": "drawn"}
-    if row["arrived"] and not row["collisions"] and (flight.sketch.changes or not row["margin_entered"]):
+    if (
+        row["arrived"]
+        and not row["collisions"]
+        and (flight.sketch.changes or not row["margin_entered"])
+    ):
         return {"feasible": True, "feasible_by": "flight"}
     if not settings.check:
         return {"feasible": None, "feasible_by": None}

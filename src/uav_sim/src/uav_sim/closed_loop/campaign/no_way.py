@@ -51,5 +51,3 @@ def widest_gap(centers: np.ndarray, shell: float) -> float:
 def _direction(rng: np.random.Generator) -> np.ndarray:
     vector = rng.normal(size=3)
     return vector / np.linalg.norm(vector)
-
-
