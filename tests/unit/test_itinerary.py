@@ -82,6 +82,7 @@ def test_a_suspended_goal_goes_on_where_it_was(itinerary):
     itinerary.suspend(np.array([8.2, 0.4, 2.0]), 0.5)
     assert itinerary.goal is Goal.HOLD
     assert itinerary.outcome is None
+    assert itinerary.is_pursuing
     for t in np.arange(2.0, 40.0, 0.5):
         itinerary.update(t, np.array([8.2, 0.4, 2.0]), REST)
     held = itinerary.reference(np.array([40.0, 45.0]))
@@ -130,6 +131,7 @@ def test_resume_without_a_suspended_goal_changes_nothing(itinerary):
     itinerary.suspend(START, 0.0)
     itinerary.hold(END, 0.0, "told to hold")
     assert not itinerary.outcome.arrived, "holding ends the goal, suspended or not"
+    assert not itinerary.is_pursuing
     itinerary.resume(5.0)
     assert itinerary.goal is Goal.HOLD
     assert np.all(itinerary.reference(np.array([6.0]))[0, POSITION] == END)

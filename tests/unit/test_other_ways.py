@@ -97,7 +97,7 @@ def test_what_does_not_stand_in_the_way_costs_nothing(nmpc):
         assert len(solves) == 4
         solves.clear()
         fly(nmpc, 1, (BALL,), 4)
-        assert 4 + 3 < len(solves) <= 4 + 2 * (8 + 3), "all sides at first, then one a tick"
+        assert 4 + 3 < len(solves) <= 4 + 2 * (8 + 3), "all sides at first, then one now and then"
     finally:
         nmpc.solver = solver
 

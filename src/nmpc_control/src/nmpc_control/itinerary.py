@@ -42,9 +42,14 @@ class Itinerary:
         self._held_last = 0.0  # [s]
         self._settled_since: Optional[float] = None
 
+    @property
+    def is_pursuing(self) -> bool:
+        """Whether there is a goal that is not over, under way or suspended."""
+        return self.goal is not Goal.HOLD or self._suspended is not None
+
     def hold(self, position: np.ndarray, yaw: float, message: str = "told to hold") -> None:
         """Hold a position (3,) [m] and yaw [rad]; a goal that was pursued ends without arrival."""
-        if self.goal is not Goal.HOLD or self._suspended is not None:
+        if self.is_pursuing:
             self._end(False, message)
         self._hold = (np.array(position, dtype=float), float(yaw))
 
@@ -96,10 +101,9 @@ class Itinerary:
             velocity: (3,) [m/s] of it.
             held_up: whether obstacles keep it from going on; then time does not press.
         """
-        is_suspended = self._suspended is not None
-        if self.goal is Goal.HOLD and not is_suspended:
+        if not self.is_pursuing:
             return
-        if self._is_out_of_patience(t, held_up or is_suspended):
+        if self._is_out_of_patience(t, held_up or self._suspended is not None):
             self._give_up(t, position, f"held up for {self.flight.patience:g} s")
         if self.goal is Goal.HOLD:
             return
