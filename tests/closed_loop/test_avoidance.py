@@ -161,6 +161,20 @@ def test_a_goal_inside_an_obstacle_is_given_up_outside_of_it(protected):
         assert np.linalg.norm(flight.truth.velocity) < 0.15
 
 
+def test_where_only_the_guard_sees_an_obstacle_the_goal_is_given_up():
+    """It brakes again and again for what the solver flies at: without patience for ever."""
+    flight = Flight(patience=6.0)
+    flight.know([ball(5.0, radius=1.0)])
+    flight.loop.controller.obstacles = ()
+    flight.itinerary.go_to(flight.loop.t, np.array([0.0, 0, 10]), 0.0, np.array([9.0, 0, 10]), 0.0)
+    outcome = flight.until_over(20.0)
+    flight.run(2.0)
+    assert "held up" in outcome.message
+    assert np.linalg.norm(flight.truth.velocity) < 0.15
+    assert flight.loop.guard.mode is Mode.HOVERING
+    assert flight.clearances().min() > 0.1
+
+
 @TWINS
 def test_a_gap_that_is_too_narrow_is_not_flown_through(protected):
     flight = Flight(protected)
