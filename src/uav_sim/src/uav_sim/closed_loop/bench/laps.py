@@ -39,6 +39,8 @@ class Lap:
 class _Repeated:
     """A timing that runs over the curve again and again."""
 
+    continuous = True
+
     def __init__(self, once: Timing, times: int) -> None:
         self._once = once
         self.duration = times * once.duration
