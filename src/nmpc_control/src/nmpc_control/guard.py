@@ -11,7 +11,7 @@ from nmpc_control import modes
 from nmpc_control.braking import Brake
 from nmpc_control.disturbance_estimate import DisturbanceEstimate
 from nmpc_control.dji import FlightStatus
-from nmpc_control.guard_data import Action, GuardInputs, GuardOutput
+from nmpc_control.guard_data import Action, Command, GuardInputs, GuardOutput
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.ladder import PlanLadder, Rung
 from nmpc_control.mode_conditions import battery_is_low, pilot_has_control
@@ -21,7 +21,7 @@ from nmpc_control.override import Override
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.preflight import preflight
 from nmpc_control.sent_inputs import SentInputs
-from nmpc_control.setpoints import Command, Setpoints
+from nmpc_control.setpoints import Setpoints
 from nmpc_control.situation import Situation
 from nmpc_control.state import POSITION, VELOCITY, hover_input
 from nmpc_control.verdict import Verdict

@@ -1,23 +1,14 @@
 # SPDX-License-Identifier: MIT
 """From inputs of the model to axes of DJI's setpoint, as the launch commands the vertical axis."""
 
-from dataclasses import dataclass
-from typing import Optional, Sequence, Tuple
+from typing import Sequence
 
 from nmpc_control import dji
+from nmpc_control.guard_data import Command
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.ladder import Rung
 from nmpc_control.params import Vehicle
 from nmpc_control.state import THRUST
-
-
-@dataclass(frozen=True)
-class Command:
-    """What a tick sends; without axes: silence."""
-
-    rung: Rung
-    axes: Optional[dji.Axes] = None
-    applied: Optional[Tuple[float, ...]] = None  # (4,) input that the axes command, where known
 
 
 class Setpoints:

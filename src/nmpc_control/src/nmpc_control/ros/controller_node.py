@@ -125,7 +125,7 @@ class ControllerNode:
             self._requests.get_nowait()(t)
         self.controller.obstacles, _ = self._port.look(t)
         self.publishers.obstacles(t, self.controller.obstacles)
-        pursued = self.controller.itinerary.pursued
+        pursued = self.controller.itinerary.is_pursuing
         clock_start = self.controller.itinerary.clock_start
         step = self.controller.step(t)
         self.publishers.diagnose(step, misses)
