@@ -127,6 +127,8 @@ def pilot_takes_over():
     """Hover, see the switch leave F for a moment; the stream is silent until a new start."""
     client = Client()
     client.hover()
+    client.go_to(5.0, 0.0, 3.0)
+    client.wait("FLYING")
     while MODES[client.statuses[-1].mode] != "MANUAL":  # against the simulator's own F
         header = Header(stamp=rospy.Time.now())
         client.rc.publish(Joy(header=header, axes=[0, 0, 0, 0, -8000.0, -10000.0]))
@@ -140,6 +142,12 @@ def pilot_takes_over():
     seen["start"] = client.ask("start")
     client.wait("HOVERING", 10.0)
     seen["modes"] = client.modes()
+    seen["resume"] = client.ask("resume")
+    client.wait("FLYING", 5.0)
+    client.wait("HOVERING", 20.0)
+    seen["arrived_at"] = client.position[0]
+    seen["codes"] = [status.reason_code for status in client.statuses]
+    seen["resume_again"] = client.ask("resume")
     return seen
 
 

@@ -58,8 +58,12 @@ def test_the_pilot_silences_the_stream_and_only_a_new_start_resumes(flight):
     assert seen["last_setpoint_after"] < 0.0
     assert seen["start"] == [True, "braking to hover"]
     modes = seen["modes"]
-    assert modes.index("MANUAL") == modes.index("HOVERING") + 1
+    assert modes.index("MANUAL") == modes.index("FLYING") + 1
     assert modes[-4:] == ["WAITING", "READY", "BRAKING", "HOVERING"]
+    assert seen["resume"] == [True, "flying to where it was left"]
+    assert abs(seen["arrived_at"] - 5.0) < 0.5
+    assert seen["resume_again"] == [False, "nothing waits to be resumed"]
+    assert {"pilot", "pilot_gave_back", "asked", "recovered", "goal"} <= set(seen["codes"])
 
 
 def test_ctrl_c_in_the_air_gives_authority_back(flight):

@@ -190,3 +190,70 @@ def test_go_to_arrives_and_hold_interrupts(itinerary):
     itinerary.hold(START, 1.0)
     assert not itinerary.outcome.arrived
     assert itinerary.goal is Goal.HOLD
+
+
+# left to the pilot
+
+
+def on_the_line(itinerary, seconds=1.0):
+    itinerary.begin(0.0, line(START, END, speed=1.5))
+    return follow(itinerary, 0.0, seconds)
+
+
+def test_a_trajectory_left_to_the_pilot_waits_until_it_is_asked_for(itinerary):
+    t = on_the_line(itinerary)
+    left = itinerary.reference_time(t)
+    away = np.array([5.0, 8.0, 3.0])
+    for t in (2.0, 20.0, 200.0):  # longer than the patience with obstacles
+        itinerary.leave_to_pilot(t, away, 1.0)
+        itinerary.update(t, away, REST)
+        itinerary.resume(t)
+        assert (itinerary.goal, itinerary.waits) == (Goal.HOLD, True)
+        assert itinerary.reference(np.array([t]))[0, POSITION] == pytest.approx(away)
+    itinerary.take_up(201.0, away, 1.0)
+    assert (itinerary.goal, itinerary.waits) == (Goal.APPROACH, False)
+    assert itinerary.reference(np.array([201.0]))[0, POSITION] == pytest.approx(away)
+    t = 201.0
+    while itinerary.goal is Goal.APPROACH and t < 260.0:
+        t = follow(itinerary, t, t + 0.05)
+    assert itinerary.goal is Goal.TRAJECTORY
+    assert itinerary.reference_time(t) == pytest.approx(left, abs=0.1)
+    follow(itinerary, t, t + 20.0)
+    assert itinerary.outcome.arrived
+
+
+def test_an_approach_left_to_the_pilot_goes_on_to_the_same_place(itinerary):
+    itinerary.fly(0.0, np.zeros(3), 0.0, line(START, END, speed=1.5))
+    t = follow(itinerary, 0.0, 1.0)
+    itinerary.leave_to_pilot(t, np.ones(3), 0.0)
+    itinerary.take_up(t + 5.0, np.ones(3), 0.0)
+    follow(itinerary, t + 5.0, t + 40.0)
+    assert itinerary.outcome.arrived
+    assert itinerary.reference(np.array([t + 41.0]))[0, POSITION] == pytest.approx(END)
+
+
+def test_interrupted_again_on_the_way_back_it_still_goes_on_where_it_was_left(itinerary):
+    t = on_the_line(itinerary)
+    left = itinerary.reference_time(t)
+    itinerary.leave_to_pilot(t, np.zeros(3), 0.0)
+    itinerary.take_up(t + 1.0, np.zeros(3), 0.0)
+    itinerary.leave_to_pilot(t + 2.0, np.zeros(3), 0.0)
+    itinerary.take_up(t + 3.0, np.zeros(3), 0.0)
+    t = t + 3.0
+    while itinerary.goal is Goal.APPROACH and t < 60.0:
+        t = follow(itinerary, t, t + 0.05)
+    assert itinerary.reference_time(t) == pytest.approx(left, abs=0.1)
+
+
+def test_what_waits_is_dropped_by_a_hold_and_in_time(itinerary):
+    t = on_the_line(itinerary)
+    itinerary.leave_to_pilot(t, np.zeros(3), 0.0)
+    itinerary.hold(np.zeros(3), 0.0)
+    assert not itinerary.waits
+    t = on_the_line(itinerary)
+    itinerary.leave_to_pilot(t, np.zeros(3), 0.0)
+    itinerary.forget_in_time(t + itinerary.flight.memory - 1.0)
+    assert itinerary.waits
+    itinerary.forget_in_time(t + itinerary.flight.memory + 1.0)
+    assert not itinerary.waits
+    assert "not taken up again" in itinerary.outcome.message
