@@ -81,3 +81,13 @@ def test_no_obstacle_is_no_row():
     assert field.unusable == ()
     assert field.distances(way(0), TIMES).shape == (0, len(TIMES))
     assert field.spheres(way(0), TIMES).radius.shape == (0, len(TIMES))
+
+
+def test_a_part_is_as_if_made_of_these_alone():
+    which = np.array([4, 0, 2])
+    points, obstacles = way(3), some()
+    part, alone = ObstacleField(obstacles).part(which), ObstacleField([obstacles[i] for i in which])
+    assert part.ids == alone.ids
+    np.testing.assert_array_equal(part.distances(points, TIMES), alone.distances(points, TIMES))
+    np.testing.assert_array_equal(part.has_path, [True, False, False])
+    assert ObstacleField([*obstacles, obstacles[0]]).part(which).unusable == ()

@@ -84,14 +84,14 @@ def _narrowed(
 ) -> ObstacleField:
     """Return those that matter, given what the clearances (n,) [m] are at least."""
     closest = int(np.argmin(least))
-    only = ObstacleField([obstacles.obstacles[closest]])
+    only = obstacles.part(np.array([closest]))
     nearest = float(_refined(points, times, t, only, radius).grown.min())
     # what follows a path of its own may leave the straight line that the bound takes
-    keep = (least < max(reach, nearest)) | [o.path is not None for o in obstacles.obstacles]
+    keep = (least < max(reach, nearest)) | obstacles.has_path
     keep[closest] = True
     if keep.all():
         return obstacles
-    return ObstacleField([obstacles.obstacles[i] for i in np.nonzero(keep)[0]])
+    return obstacles.part(np.nonzero(keep)[0])
 
 
 def _bound_as_one(
@@ -173,6 +173,12 @@ def check_clearance(
     return _judged(way, max(t, stages[0]) + params.clearance_horizon, params, before, plan)
 
 
+def _said(plan: Plan) -> str:
+    """Return that the plan is verified, and what its solver remarks on it, as held up by what."""
+    remark = plan.status.partition(", ")[2]
+    return f"the plan is verified, {remark}" if remark else "the plan is verified"
+
+
 def _judged(
     way: Approach, until: float, params: PlanCheckParameters, before: Inside, plan: Plan
 ) -> Verdict:
@@ -186,7 +192,7 @@ def _judged(
         speed = float(np.linalg.norm(plan.state_at(way.times[k])[VELOCITY]))
     verdict = Verdict(
         Finding.OK,
-        "the plan is verified",
+        _said(plan),
         clearance=float(way.grown.min(initial=math.inf)),
         flown=plan,
         nearest=float((nearest - way.growth).min(initial=math.inf)),

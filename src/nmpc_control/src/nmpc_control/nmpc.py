@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The controller's optimiser: poses the problem of ``ocp``, keeps the warm start, returns plans."""
 
+import time
 from dataclasses import replace
 from typing import Optional, Sequence, Tuple, Union
 
@@ -99,6 +100,7 @@ class Nmpc:
             ProblemError: a wrong shape; a time, reference or obstacle that is not finite.
         """
         check_arguments(t, x0, x_ref, u_before, u_ref, self.structure.horizon)
+        start = time.perf_counter()
         problem = self._pose(t, x0, x_ref, u_before, obstacles, u_ref)
         guess, reference = self._guess(t), x_ref[:, POSITION]
         path = reference if guess is None else guess.states[:, POSITION]
@@ -114,7 +116,8 @@ class Nmpc:
             solution, self._slots = choice.solution, choice.slots
             self.held_up_by = self._holding(problem, solution, choice.blocked)
         self._last, self._last_t = (solution, t) if solution.found else (None, 0.0)
-        return self.as_plan(t, solution, self._remark(solution, problem))
+        whole = replace(solution, solve_time=time.perf_counter() - start)
+        return self.as_plan(t, whole, self._remark(solution, problem))
 
     def _pose(
         self,

@@ -4,6 +4,7 @@
 Converted once for each list; hundreds cost little more than one.
 """
 
+import copy
 from functools import cached_property
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
@@ -13,6 +14,9 @@ from nmpc_control.obstacle import MAX_GROWTH, Obstacle, surface_distance
 
 SHAPES = ("sphere", "cylinder", "box")
 ROUND = 1.0  # [m] least radius of the sphere that stands for the flat part of a surface
+
+
+_ROWS = ("_position", "_velocity", "_stamp", "_growth", "_shape", "_size", "bounding")
 
 
 class Spheres(NamedTuple):
@@ -49,7 +53,14 @@ class ObstacleField:
 
     def part(self, which: np.ndarray) -> "ObstacleField":
         """Return some of them, by their indices (k,), in that order."""
-        return ObstacleField([self.obstacles[i] for i in which])
+        some = copy.copy(self)
+        some.__dict__.pop("unusable", None)
+        some.obstacles = tuple(self.obstacles[i] for i in which)
+        some.ids = tuple(o.id for o in some.obstacles)
+        for name in _ROWS:
+            setattr(some, name, getattr(self, name)[which])
+        some._paths = [k for k, i in enumerate(which) if i in self._paths]
+        return some
 
     @cached_property
     def unusable(self) -> Tuple[str, ...]:
@@ -61,6 +72,13 @@ class ObstacleField:
             o = self.obstacles[i]
             good[i] &= bool(np.isfinite(o.path).all()) and o.path_dt > 0.0
         return tuple(name for name, ok in zip(self.ids, good) if not ok)
+
+    @property
+    def has_path(self) -> np.ndarray:
+        """Which of them (n,) follow a path."""
+        result = np.zeros(len(self.ids), dtype=bool)
+        result[self._paths] = True
+        return result
 
     def centres(self, times: np.ndarray) -> np.ndarray:
         """Return the centres (n, M, 3) [m] at times (M,) [s]."""

@@ -19,6 +19,7 @@ from nmpc_control.slots import Slots
 from nmpc_control.solution import Guess, Solution
 from nmpc_control.state import NU, NX, POSITION, VELOCITY
 
+_PAUSE = 3  # ticks from one try to the next while there is a solution
 _BETTER = 0.95  # of its cost: what is dearer than this is no reason to change
 _SIDEWAYS = 1.5  # [m/s] of a way away from the reference
 
@@ -78,6 +79,7 @@ class OtherWays:
         self._tries = tries
         self.changes = 0
         self._turns = Turns()
+        self._ticks = 0
         self._shooting = shooting
 
     def improve(
@@ -95,11 +97,14 @@ class OtherWays:
         reference = eased(problem.x_ref[:, POSITION], problem.x0[POSITION], problem.times)
         spheres = slots.field.spheres(reference, problem.times)
         best = Choice(solution, slots, blocked=conflicts(spheres, problem.margin, reference))
-        if not (best.blocked.any() and self._tries):
+        self._ticks += 1
+        at_once = not warm or not solution.found  # else a try now and then is enough
+        due = self._tries and (at_once or self._ticks % _PAUSE == 0)
+        if not (due and best.blocked.any()):
             return best
         across = sides(reference[-1] - reference[0])
         slope = _SIDEWAYS * problem.structure.dt
-        for index in self._turns.take(self._tries if warm and solution.found else SIDES):
+        for index in self._turns.take(SIDES if at_once and self._shooting else self._tries):
             way = way_round(spheres, problem.margin, reference, across[index], slope)
             if way is None:
                 continue

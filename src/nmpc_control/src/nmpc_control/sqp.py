@@ -10,6 +10,7 @@ bounded by the weight of the L1 penalty, are updated whenever the inner iteratio
 """
 
 import time
+from functools import lru_cache
 from typing import Dict, List, Optional, Tuple
 
 import casadi as ca
@@ -44,6 +45,11 @@ def sweeps(structure: Structure) -> List[ca.Function]:
     return [*both, forward(structure), settle(structure)]
 
 
+@lru_cache(maxsize=8)
+def _compiled(structure: Structure) -> Dict[str, ca.Function]:
+    return compile_functions(sweeps(structure))
+
+
 class SqpSolver:
     """Solver of one problem structure; call ``solve`` from one thread at a time.
 
@@ -67,9 +73,8 @@ class SqpSolver:
         self.tolerance, self.max_iterations = tolerance, max_iterations
         self.warm_iterations = min(max_iterations, warm_iterations or max_iterations)
         self.time_budget = time_budget
-        functions = compile_functions(sweeps(structure))
         self._arrays: Dict[str, np.ndarray] = {}
-        calls = {name: Buffered(f, self._arrays) for name, f in functions.items()}
+        calls = {name: Buffered(f, self._arrays) for name, f in _compiled(structure).items()}
         self._backward, self._backward_exact = calls["backward"], calls["backward_exact"]
         self._forward, self._settle = calls["forward"], calls["settle"]
         self._tracking, self._penalties = np.inf, 0.0  # cost of the iterate
