@@ -3,20 +3,21 @@
 """An operator of a flight indoors; prints what was seen as JSON in the last line.
 
 Vicon is silent before the start, comes, is replaced by another source 0.3 m beside it and back,
-and goes silent in flight.
+goes silent in flight, and comes again for the landing.
 """
 
 import json
 import math
 import sys
 
+import actionlib
 import rospy
-from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import Point, PointStamped
 from guard_client import Client
 from nav_msgs.msg import Odometry
 from std_msgs.msg import String
 
-from nmpc_msgs.msg import PositionSource
+from nmpc_msgs.msg import FlyTrajectoryAction, FlyTrajectoryGoal, PositionSource
 from nmpc_msgs.srv import ClearFault, InjectFault, SelectSource
 
 BESIDE = 0.3  # [m] east of the truth
@@ -41,6 +42,15 @@ class ViconClient(Client):
 
     def silence(self):
         self._inject("topic_dropped", "{topic: vicon}", 0.0, 0.0)
+
+    def fly(self, waypoints):
+        """Fly a trajectory; return whether it was flown to its end, and a sentence."""
+        action = actionlib.SimpleActionClient("fly_trajectory", FlyTrajectoryAction)
+        action.wait_for_server(rospy.Duration(10.0))
+        action.send_goal(FlyTrajectoryGoal(waypoints=waypoints, speed=0.8))
+        action.wait_for_result(rospy.Duration(40.0))
+        result = action.get_result()
+        return [result.arrived, result.message]
 
     def select(self, name):
         answer = self._select(name)
@@ -68,9 +78,7 @@ def main():
     seen["start_silent"] = client.ask("start")
     client.clear("")
     seen["start"] = client.hover()
-    client.go_to(*TARGET)
-    client.wait("FLYING", 5.0)
-    client.wait("HOVERING", 20.0)
+    seen["flown"] = client.fly([Point(0.0, 0.0, 1.5), Point(*TARGET)])
     rospy.sleep(1.0)
     seen["off"] = client.off()
     begun = len(client.statuses)
@@ -88,6 +96,13 @@ def main():
     seen["brake_after"] = client.wait("RELEASED", 3.0).header.stamp.to_sec() - silent
     seen["reason"] = client.statuses[-1].reason
     seen["modes"] = client.modes()
+    client.clear("")
+    rospy.sleep(1.5)
+    seen["start_again"] = client.ask("start")
+    client.wait("HOVERING", 10.0)
+    seen["land"] = client.ask("land")
+    client.wait("READY", 30.0)  # at once after WAITING, which says that it has landed
+    seen["height"] = client.position[2]
     seen["collisions"] = len(client.collisions)
     return seen
 
