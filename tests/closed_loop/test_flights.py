@@ -93,6 +93,7 @@ def test_the_guard_alone_does_not_let_a_blind_plan_hit_a_sphere(tmp_path):
     _, metrics = run(tmp_path, "multi_obstacle", "--avoidance", "off")
     assert metrics["collisions"] == 0
     assert metrics["plans_rejected"] > 0
+    assert not metrics["arrived"]
 
 
 def test_both_backends_fly_the_same_way():

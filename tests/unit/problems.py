@@ -15,16 +15,21 @@ from nmpc_control.params import Parameters, load_parameters
 SPHERE = Obstacle("sphere", np.array([4.0, 0.3, 5.2]), np.array([0.6]))
 
 
-def parameters(backend: str, **solver: object) -> Parameters:
-    """Return the default parameters with another backend and solver options."""
+def parameters(backend: str, term: str = "potential", **solver: object) -> Parameters:
+    """Return the default parameters with another backend, obstacle term and solver options.
+
+    No other way round is tried: what one solve from one guess finds is what is looked at.
+    """
     base = load_parameters()
-    chosen = dataclasses.replace(base.solver, backend=backend)
-    return dataclasses.replace(base, solver=chosen.with_budget(**solver))
+    chosen = dataclasses.replace(base.solver, backend=backend).with_budget(**solver)
+    avoidance = dataclasses.replace(base.avoidance, term=term, guides=0)
+    return dataclasses.replace(base, solver=chosen, avoidance=avoidance)
 
 
-def tight(backend: str) -> Nmpc:
+def tight(backend: str, term: str = "potential") -> Nmpc:
     """Return an optimiser that iterates until it is exact."""
-    return Nmpc(parameters(backend, tolerance=1e-9, max_iterations=500, time_budget=30.0))
+    budget = {"tolerance": 1e-9, "max_iterations": 500, "warm_iterations": 500}
+    return Nmpc(parameters(backend, term, time_budget=30.0, **budget))
 
 
 def straight_reference(nmpc: Nmpc, speed: float = 1.5) -> np.ndarray:

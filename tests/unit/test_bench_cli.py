@@ -26,7 +26,7 @@ ROW = {
 
 @pytest.fixture
 def tiny(monkeypatch):
-    # N = 60 with 8 slots is compiled anyway: it is what flies
+    # N = 60 with 8 slots is compiled anyway: it is what the bench solves
     effort = replace(QUICK, problems=1, repeats=1, until=0.1, horizons=(20, 60), slots=(0, 4, 8))
     monkeypatch.setattr(cli, "QUICK", effort)
 

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nmpc_control.ocp import NU, NX, SLOT_SIZE
-from nmpc_control.params import load_parameters
+from nmpc_control.ocp import NU, NX, PARTS, SLOT_SIZE
 from nmpc_control.scenario import load_scenario
 from uav_sim.closed_loop.bench.objective import Objective
 from uav_sim.closed_loop.bench.paper_backend import PaperBackend
+from uav_sim.closed_loop.bench.parameters import bench_parameters
 from uav_sim.closed_loop.bench.problem import Problem, Recorder
 from uav_sim.closed_loop.bench.problems import KINDS, in_reach, recorded_problems
 from uav_sim.closed_loop.bench.random_problems import random_problems
-from uav_sim.closed_loop.bench.recording import PLANT, exact_solver, record, structure_of
+from uav_sim.closed_loop.bench.recording import exact_solver, record, structure_of
 from uav_sim.closed_loop.bench.scenes import scatter
 
 COUNT = 3
@@ -58,7 +58,7 @@ def test_cold_starts_lie_five_metres_off_and_have_no_guess(recorded):
 
 def test_a_push_changes_the_velocity_by_three_metres_per_second():
     scenario = load_scenario("go_to_point")
-    parameters = load_parameters(PLANT, scenario.weights)
+    parameters = bench_parameters(scenario.weights)
     solver = exact_solver(structure_of(parameters))
     flight = record(scenario, parameters, solver, pushes_seed=3, until=0.3)
     assert len(flight.pushes) == 1
@@ -72,9 +72,11 @@ def test_reach_is_the_distance_at_which_the_potential_begins(recorded):
     problem = recorded["hexagon"][0]
     stages = problem.instance.stages.copy()
     stages[NX + NU : NX + NU + SLOT_SIZE] = np.array([1.0, 2.0, 3.0, 1.0, 1 / 1.7])[:, None]
-    problem = replace(problem, instance=replace(problem.instance, stages=stages))
-    assert in_reach(problem, np.array([[1.0, 2.0, 4.6]]))
-    assert not in_reach(problem, np.array([[1.0, 2.0, 4.8]]))
+    theta = problem.instance.theta.copy()
+    theta[PARTS["cushion"]] = 0.1
+    problem = replace(problem, instance=replace(problem.instance, stages=stages, theta=theta))
+    assert in_reach(problem, np.array([[1.0, 2.0, 4.75]]))
+    assert not in_reach(problem, np.array([[1.0, 2.0, 4.85]]))
 
 
 def test_random_problems_are_the_same_for_the_same_seed(drawn):
@@ -90,8 +92,8 @@ def test_every_second_random_problem_is_warm_started(drawn):
 
 
 def test_random_states_touch_no_obstacle(drawn):
-    parameters = load_parameters(PLANT)
-    reach = parameters.avoidance.safety_distance + parameters.avoidance.inflation
+    parameters = bench_parameters()
+    reach = parameters.avoidance.safety_distance
     for problem in drawn:
         slots = problem.instance.stages[NX + NU :, 0].reshape(-1, SLOT_SIZE)
         slots = slots[slots[:, 4] < 1e5]
@@ -138,7 +140,7 @@ def test_defect_is_what_a_plan_violates(recorded, solver):
 
 def test_paper_backend_sees_the_same_spheres(recorded):
     scenario = load_scenario("multi_obstacle")
-    parameters = load_parameters(PLANT, scenario.weights)
+    parameters = bench_parameters(scenario.weights)
     problem = recorded["multi_obstacle"][0]
     assert structure_of(parameters) == problem.structure
     spheres = PaperBackend(parameters)._spheres(problem.instance)

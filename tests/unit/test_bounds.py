@@ -5,13 +5,14 @@ import dataclasses
 
 import numpy as np
 import pytest
-from problems import SPHERE, straight_reference, tight
+from problems import SPHERE, random_states, straight_reference, tight
 
 from nmpc_control.errors import ConfigError, ProblemError
 from nmpc_control.ipopt import IpoptSolver, slack_kinds, transcribe
 from nmpc_control.nmpc import Nmpc
 from nmpc_control.ocp import Structure
 from nmpc_control.state import hover_input, hover_state
+from uav_sim.closed_loop.bench.problem import Recorder
 
 EXCESS = 2e-3  # [m], [m/s]
 START = hover_state(np.array([0.0, 0.0, 5.0]))
@@ -124,6 +125,33 @@ def test_bounds_that_cannot_be_meant_are_refused(nmpc, limits):
     base = nmpc.parameters
     with pytest.raises(ProblemError):
         nmpc.use(dataclasses.replace(base, limits=dataclasses.replace(base.limits, **limits)))
+    assert nmpc.parameters is base
+
+
+def test_the_barrier_is_the_same_problem_to_both_backends():
+    """Random states, one inside the margin: IPOPT finds nothing cheaper near our solution."""
+    ours = tight("compiled", "barrier")
+    ours.solver.tolerance = 1e-7
+    ours.solver = recorder = Recorder(ours.solver)
+    theirs = IpoptSolver(ours.structure, 1e-7, 500, 30.0)
+    felt = inside = 0
+    for x0 in random_states(8, seed=21) + [hover_state(SPHERE.position + [0.0, -1.4, 0.0])]:
+        plan, solution = solve(ours, x0, (SPHERE,))
+        again = theirs.solve(recorder.instances[-1], solution.guess)
+        assert again.found
+        assert again.cost == pytest.approx(plan.cost, rel=1e-3)
+        felt += SPHERE.distance(plan.states[:, :3]).min() < 1.25
+        inside += solution.softened == "obstacle"
+    assert felt >= 4, "the sample must hold problems in which the sphere is felt"
+    assert inside >= 1
+
+
+@pytest.mark.parametrize("weight", [-1.0, 0.0, np.nan, np.inf])
+def test_a_weight_of_eq_7_that_protects_nothing_is_refused(nmpc, weight):
+    base = nmpc.parameters
+    avoidance = dataclasses.replace(base.avoidance, term="barrier", weight=weight)
+    with pytest.raises(ProblemError, match="weight"):
+        nmpc.use(dataclasses.replace(base, avoidance=avoidance))
     assert nmpc.parameters is base
 
 

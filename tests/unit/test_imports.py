@@ -75,7 +75,8 @@ SAFETY = {
 MATHEMATICS = {
     f"nmpc_control.{n}"
     for n in ("augmented", "constraints", "model", "newton_step", "nmpc", "obstacle_terms", "ocp")
-    + ("packing", "parametric", "riccati", "rollout", "slots", "small_matrices")
+    + ("guides", "other_ways", "packing", "parametric", "riccati", "rollout", "slots")
+    + ("small_matrices", "sweeps")
 }
 SOLVER = MATHEMATICS | {f"nmpc_control.{n}" for n in ("ipopt", "sqp")}
 CLOCKS = {"time.perf_counter", "time.monotonic"}

@@ -204,10 +204,10 @@ def test_the_plain_float_twin_makes_the_same_step(name, tolerance):
 
 
 def test_disturbance_is_an_acceleration_in_the_world_frame():
-    vehicle = dataclasses.replace(load_vehicle("dji_hil"), drag=np.zeros(3))
     d = np.array([0.5, -0.3, 0.2])
+    vehicle = dataclasses.replace(load_vehicle("dji_hil"), drag=np.zeros(3), disturbance=d)
     after = call(
-        step_function(DT), hover_state(np.zeros(3)), hover_input(), model_parameters(vehicle, d)
+        step_function(DT), hover_state(np.zeros(3)), hover_input(), model_parameters(vehicle)
     )
     assert after[6:9] == pytest.approx(d * DT)
     assert after[:3] == pytest.approx(d * DT**2 / 2)

@@ -17,9 +17,8 @@ from nmpc_control.nmpc import Nmpc
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.ocp import Structure
 from nmpc_control.packing import pack_stages
-from nmpc_control.params import load_parameters
-from nmpc_control.sqp import sweeps
 from nmpc_control.state import GRAVITY, hover_input, hover_state
+from nmpc_control.sweeps import sweeps
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +61,7 @@ def test_compiled_is_not_worse_than_ipopt_beside_an_obstacle(compiled, ipopt):
 
 def test_what_flies_says_converged_only_within_its_tolerance(compiled):
     """Random states, tight rates and an obstacle: what is left to gain is what was promised."""
-    base = load_parameters("dji_hil")
+    base = parameters("compiled")
     worse = []
     for rate in (base.limits.input_rate, np.array([5.0, 0.6, 0.6, 0.6])):
         p = dataclasses.replace(base, limits=dataclasses.replace(base.limits, input_rate=rate))

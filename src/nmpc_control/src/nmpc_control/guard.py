@@ -2,7 +2,7 @@
 """The safety process without ROS: plan check, ladder, modes and the setpoint of one tick."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Callable, Optional, Sequence, Tuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from nmpc_control import dji, modes
 from nmpc_control.braking import Brake
 from nmpc_control.disturbance_estimate import DisturbanceEstimate
 from nmpc_control.estimator import StateEstimate
-from nmpc_control.guard_data import Action, GuardInputs, GuardOutput
+from nmpc_control.guard_data import Action, Command, GuardInputs, GuardOutput
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.ladder import PlanLadder, Rung
 from nmpc_control.mode_inputs import (
@@ -33,13 +33,6 @@ from nmpc_control.verdict import Verdict
 MAX_TICK = 0.1  # [s] a longer pause between ticks counts as this
 FORGOTTEN = 0.5  # [s] after its effect an input no longer shows in the attitude
 MAX_FAILURES = 10  # [1] ticks in a row that may raise before authority is released
-
-
-@dataclass(frozen=True)
-class _Command:
-    rung: Rung
-    axes: Optional[dji.Axes] = None
-    applied: Optional[Tuple[float, ...]] = None
 
 
 class Guard:
@@ -253,26 +246,26 @@ class Guard:
 
     def _command(
         self, i: GuardInputs, seen: ModeInputs, rung: Rung, dt: float, override: str
-    ) -> _Command:
+    ) -> Command:
         if self.mode in PLANNED and not override:
             plan = self.ladder.plan
             up = float(plan.state_at(i.t + plan.delay)[VELOCITY][2])
-            return _Command(rung, *self._axes(plan.input_at(i.t), up))
+            return Command(rung, *self._axes(plan.input_at(i.t), up))
         # until DJI's own landing has begun: silence while a service call blocks is nobody's control
         awaits_landing = self.mode is Mode.LANDING and seen.in_air
         if self.mode is not Mode.BRAKING and not awaits_landing and not override:
-            return _Command(Rung.RELEASE if self.mode is Mode.RELEASED else Rung.NONE)
+            return Command(Rung.RELEASE if self.mode is Mode.RELEASED else Rung.NONE)
         has_position = seen.position_age <= self.params.modes.position_timeout
         has_velocity = seen.velocity_age <= self.params.modes.velocity_timeout
         rung = Rung.BRAKE if has_position and has_velocity else Rung.BRAKE_BLIND
         if not seen.authority:
-            return _Command(rung)
+            return Command(rung)
         if self._gps_holds(seen):
             self._brake.begin(hover_input())  # where a brake of our own would have to go on from
-            return _Command(rung, self._hold_axes())
+            return Command(rung, self._hold_axes())
         state = self._state_in_effect(i)
         u = self._brake.input(state, dt, has_position and has_velocity)
-        return _Command(rung, *self._axes(u, 0.0))
+        return Command(rung, *self._axes(u, 0.0))
 
     def _state_in_effect(self, i: GuardInputs) -> np.ndarray:
         """Return the state (10,) expected when a command sent now takes effect."""

@@ -41,6 +41,15 @@ class GuardInputs:
 
 
 @dataclass(frozen=True)
+class Command:
+    """What one tick sends to the aircraft, and by which rung of the ladder."""
+
+    rung: Rung
+    axes: Optional[Axes] = None  # Joy axes to publish; None: silence
+    applied: Optional[Tuple[float, ...]] = None  # (4,) input that the axes command, where known
+
+
+@dataclass(frozen=True)
 class GuardOutput:
     """What one tick decided."""
 

@@ -12,7 +12,7 @@ import numpy as np
 from nmpc_control.obstacle_field import Spheres
 
 SIDES = 8
-_ROUNDS = 4  # of pushing and smoothing
+_ROUNDS = 8  # of pushing and smoothing; a way that is not clear then is none
 _PUSHES = 12  # spheres that may stand behind one another
 _FARTHEST = 15.0  # [m] a way that leads farther off is none
 _EASE = 1.0  # [s] in which the way leads from the aircraft to the reference
@@ -67,10 +67,10 @@ def way_round(
         if not out.max() < _FARTHEST:
             return None
         smooth = (out - apart).max(axis=1)
-        if np.array_equal(smooth, push):
-            break
+        if np.all(smooth < push + _BEYOND / 2.0):  # never less: each round pushes on
+            return path + smooth[:, None] * side
         push = smooth
-    return path + push[:, None] * side
+    return None
 
 
 def _pushed_out(

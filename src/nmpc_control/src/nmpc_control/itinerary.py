@@ -11,6 +11,8 @@ from nmpc_control.reference_clock import ReferenceClock
 from nmpc_control.state import NX, POSITION, VELOCITY, YAW, YAW_RATE, Goal
 from nmpc_control.trajectory import Trajectory, approach
 
+_FREE = 3.0  # [s] of going on after which patience begins anew
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -37,11 +39,17 @@ class Itinerary:
         self._clock: Optional[ReferenceClock] = None
         self._suspended: Optional[Goal] = None
         self._held_since: Optional[float] = None
+        self._held_last = 0.0  # [s]
         self._settled_since: Optional[float] = None
+
+    @property
+    def is_pursuing(self) -> bool:
+        """Whether there is a goal that is not over, under way or suspended."""
+        return self.goal is not Goal.HOLD or self._suspended is not None
 
     def hold(self, position: np.ndarray, yaw: float, message: str = "told to hold") -> None:
         """Hold a position (3,) [m] and yaw [rad]; a goal that was pursued ends without arrival."""
-        if self.goal is not Goal.HOLD or self._suspended is not None:
+        if self.is_pursuing:
             self._end(False, message)
         self._hold = (np.array(position, dtype=float), float(yaw))
 
@@ -73,6 +81,7 @@ class Itinerary:
     def begin(self, t: float, trajectory: Trajectory) -> None:
         """Start the trajectory's clock at ``t`` [s] wherever the aircraft is."""
         self.goal, self.outcome, self._suspended = Goal.TRAJECTORY, None, None
+        self._held_since = None
         self.trajectory, self.clock_start = trajectory, t
         self._clock = ReferenceClock(trajectory, t, self.flight)
 
@@ -92,16 +101,13 @@ class Itinerary:
             velocity: (3,) [m/s] of it.
             held_up: whether obstacles keep it from going on; then time does not press.
         """
+        if not self.is_pursuing:
+            return
+        if self._is_out_of_patience(t, held_up or self._suspended is not None):
+            self._give_up(t, position, f"held up for {self.flight.patience:g} s")
         if self.goal is Goal.HOLD:
             return
         self._clock.advance(t, position)
-        if not held_up:
-            self._held_since = None
-        elif self._held_since is None:
-            self._held_since = t
-        elif t - self._held_since > self.flight.patience:
-            self._give_up(t, position, f"held up for {self.flight.patience:g} s")
-            return
         near = np.linalg.norm(position - self._target()) < self.flight.arrival_distance
         at_rest = near and np.linalg.norm(velocity) < self.flight.arrival_speed
         if self.goal is Goal.APPROACH:
@@ -145,7 +151,7 @@ class Itinerary:
         self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float
     ) -> None:
         self.goal, self.outcome, self._suspended = Goal.APPROACH, None, None
-        self.clock_start, self._settled_since = None, None
+        self.clock_start, self._settled_since, self._held_since = None, None, None
         self._leg = approach(
             position,
             target,
@@ -174,6 +180,20 @@ class Itinerary:
             self._finish("arrived")
         else:
             self.begin(t, self.trajectory)
+
+    def _is_out_of_patience(self, t: float, is_held: bool) -> bool:
+        """Return whether it has been held up, by obstacles or the guard, for too long.
+
+        Where the guard brakes for what the solver does not see, the two take turns for ever: a
+        moment of going on is no progress.
+        """
+        if not is_held:
+            if t - self._held_last > _FREE:
+                self._held_since = None
+            return False
+        self._held_since = t if self._held_since is None else self._held_since
+        self._held_last = t
+        return t - self._held_since > self.flight.patience
 
     def _finish(self, message: str) -> None:
         last = self._path.sample(np.array([self._path.duration]))

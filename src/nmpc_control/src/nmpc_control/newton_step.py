@@ -21,6 +21,11 @@ class Step(NamedTuple):
     active: int  # inputs on a bound
     changed: bool  # whether the step takes inputs to a bound or away from one
     exact: bool = False  # whether the model has the exact Hessian
+    pivot: float = math.inf  # least of the recursion; not positive: there is no such step
+
+    def descends(self, tolerance: float) -> bool:
+        """Whether the step lowers the cost and its model, or there is nothing to lower."""
+        return (self.slope < 0.0 and self.promise > 0.0) or self.residual <= tolerance
 
     @property
     def to_gain(self) -> float:

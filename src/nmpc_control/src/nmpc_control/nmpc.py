@@ -176,10 +176,10 @@ class Nmpc:
 
     def _remark(self, solution: Solution, problem: Posed) -> str:
         """Return which softened bound the plan exceeds, or into which margin it begins; or ""."""
-        if solution.softened:
-            return f", {solution.softened} exceeded by {solution.violation:.2f}"
         if self.held_up_by:
             return f", held up by {', '.join(self.held_up_by)}"
+        if solution.softened:
+            return f", {solution.softened} exceeded by {solution.violation:.2f}"
         if self._slots.left_out:
             return f", {self._slots.left_out} obstacles in reach have no slot"
         now = self._slots.field.distances(problem.x0[None, POSITION], problem.times[:1])

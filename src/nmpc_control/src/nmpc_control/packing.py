@@ -90,10 +90,11 @@ def _check_numbers(
         ("allowance", avoidance.allowance),
         ("eta", avoidance.eta),
         ("cushion_gain", avoidance.cushion_gain),
-        ("weight", avoidance.weight),
     ):
         if not 0 <= value < np.inf:
             raise ProblemError(f"{name}: got {value}, expected a number >= 0")
+    if not 0 < avoidance.weight < np.inf:
+        raise ProblemError(f"weight: got {avoidance.weight}, expected a number > 0")
 
 
 def check_arguments(

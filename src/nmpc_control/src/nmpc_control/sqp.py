@@ -10,20 +10,18 @@ bounded by the weight of the L1 penalty, are updated whenever the inner iteratio
 """
 
 import time
-from functools import lru_cache
-from typing import Dict, List, Optional, Tuple
+from typing import Dict, Optional, Tuple
 
-import casadi as ca
 import numpy as np
 
 from nmpc_control.augmented import MAXIMA, SUMS
-from nmpc_control.compiled_function import Buffered, compile_functions
+from nmpc_control.compiled_function import Buffered
 from nmpc_control.newton_step import Step, StepModel, left_to_gain
 from nmpc_control.ocp import PARTS, Instance, Structure
-from nmpc_control.riccati import NZ, SUMMARY, backward
-from nmpc_control.rollout import forward, settle
+from nmpc_control.riccati import NZ
 from nmpc_control.solution import Guess, Solution, cold_guess, no_solution, worst_violation
 from nmpc_control.state import NU, NX, YAW
+from nmpc_control.sweeps import compiled
 
 _ARMIJO = 1e-4
 _LEAST_PIVOT = 1e-6
@@ -37,17 +35,6 @@ _STIFFER, _STIFFEST = 5.0, 1e4
 _ROUNDING = 1e-10  # a smaller promise, relative, is rounding
 _BAD_GUESS = 2.0  # times the cost that the guess had where it comes from
 _SHOWN = 2e-3  # [m], [m/s] by which a softened bound must be exceeded to be reported
-
-
-def sweeps(structure: Structure) -> List[ca.Function]:
-    """Return the functions that are compiled for a structure."""
-    both = [backward(structure, exact) for exact in (False, True)]
-    return [*both, forward(structure), settle(structure)]
-
-
-@lru_cache(maxsize=8)
-def _compiled(structure: Structure) -> Dict[str, ca.Function]:
-    return compile_functions(sweeps(structure))
 
 
 class SqpSolver:
@@ -74,7 +61,7 @@ class SqpSolver:
         self.warm_iterations = min(max_iterations, warm_iterations or max_iterations)
         self.time_budget = time_budget
         self._arrays: Dict[str, np.ndarray] = {}
-        calls = {name: Buffered(f, self._arrays) for name, f in _compiled(structure).items()}
+        calls = {name: Buffered(f, self._arrays) for name, f in compiled(structure).items()}
         self._backward, self._backward_exact = calls["backward"], calls["backward_exact"]
         self._forward, self._settle = calls["forward"], calls["settle"]
         self._tracking, self._penalties = np.inf, 0.0  # cost of the iterate
@@ -214,28 +201,23 @@ class SqpSolver:
         self._arrays["clamping"][0, 0] = 1.0
         if model.newton:
             self._backward_exact()
-            if self._row("pivot") > _LEAST_PIVOT and self._descends():
+            step = self._step(exact=True)
+            if step.pivot > _LEAST_PIVOT and step.descends(self.tolerance):
                 model.refusals = 0
-                return self._step(exact=True)
+                return step
             model.refused()
         self._backward()
-        if not self._descends():
-            # sent to bounds one by one, inputs can together do harm: then only hold those on one
-            self._arrays["clamping"][0, 0] = 0.0
-            self._backward()
+        step = self._step()
+        if step.descends(self.tolerance):
+            return step
+        # sent to bounds one by one, inputs can together do harm: then only hold those on one
+        self._arrays["clamping"][0, 0] = 0.0
+        self._backward()
         return self._step()
 
-    def _row(self, name: str) -> float:
-        return float(self._arrays["summary"][SUMMARY.index(name), 0])
-
-    def _descends(self) -> bool:
-        """Whether the step lowers the cost and its model, or there is nothing to lower."""
-        slope, promise, residual = self._arrays["summary"][:3, 0].tolist()
-        return (slope < 0.0 and promise > 0.0) or residual <= self.tolerance
-
     def _step(self, exact: bool = False) -> Step:
-        slope, promise, residual, active, _, changed = self._arrays["summary"][:, 0].tolist()
-        return Step(promise, slope, residual, int(active), changed > 0, exact)
+        slope, promise, residual, active, pivot, changed = self._arrays["summary"][:, 0].tolist()
+        return Step(promise, slope, residual, int(active), changed > 0, exact, pivot)
 
     def _search(self, cost: float, step: Step) -> Tuple[Optional[float], float]:
         """Take the longest of the tried steps that lowers the cost enough.

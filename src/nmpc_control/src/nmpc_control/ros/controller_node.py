@@ -45,7 +45,7 @@ from nmpc_control.ros.subscriptions import Subscriptions
 from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
 from nmpc_control.rotations import rpy_from_quaternion
 from nmpc_control.scenario import Scenario, load_scenario
-from nmpc_control.state import POSITION, YAW, Goal
+from nmpc_control.state import POSITION, YAW
 from nmpc_msgs.msg import ControllerStatus, PositionSource
 
 _ENGAGED = (ControllerStatus.MODE_FLYING, ControllerStatus.MODE_HOVERING)
@@ -123,7 +123,7 @@ class ControllerNode:
             self._requests.get_nowait()(t)
         self.controller.obstacles, _ = self._port.look(t)
         self.publishers.obstacles(t, self.controller.obstacles)
-        pursued = self.controller.itinerary.goal is not Goal.HOLD
+        pursued = self.controller.itinerary.is_pursuing
         clock_start = self.controller.itinerary.clock_start
         step = self.controller.step(t)
         self.publishers.diagnose(step, misses)

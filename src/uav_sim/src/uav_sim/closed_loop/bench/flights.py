@@ -6,13 +6,13 @@ from typing import Any, Callable, Dict, Optional
 
 import numpy as np
 
-from nmpc_control.params import Parameters, load_parameters
+from nmpc_control.params import Parameters
 from nmpc_control.scenario import Scenario
 from nmpc_control.state import Goal
 from uav_sim.closed_loop.bench.backends import budgeted, converged, ipopt
 from uav_sim.closed_loop.bench.objective import Objective
+from uav_sim.closed_loop.bench.parameters import bench_parameters
 from uav_sim.closed_loop.bench.recording import (
-    PLANT,
     RecordedFlight,
     exact_solver,
     record,
@@ -60,7 +60,7 @@ class FlightFigures:
 
 def fly_with(name: str, scenario: Scenario, until: Optional[float] = None) -> FlightFigures:
     """Return the figures of a scenario flown with one of ``BACKENDS``, at the compiled rate."""
-    parameters = load_parameters(PLANT, scenario.weights)
+    parameters = bench_parameters(scenario.weights)
     return FlightFigures.of(record(scenario, parameters, BACKENDS[name](parameters), until=until))
 
 
@@ -68,7 +68,7 @@ def fly_with_horizon(
     seconds: float, scenario: Scenario, until: Optional[float] = None
 ) -> RecordedFlight:
     """Return the flight of a scenario with another horizon [s], the same step."""
-    parameters = load_parameters(PLANT, scenario.weights)
+    parameters = bench_parameters(scenario.weights)
     horizon = round(seconds / parameters.solver.dt)
     parameters = replace(parameters, solver=replace(parameters.solver, horizon=horizon))
     return record(scenario, parameters, exact_solver(structure_of(parameters)), until=until)

@@ -14,12 +14,13 @@ import numpy as np
 
 from nmpc_control.model import INTEGRATORS, model_parameters, reference_step, step_function
 from nmpc_control.nmpc import Nmpc
-from nmpc_control.params import Vehicle, load_parameters, load_vehicle
+from nmpc_control.params import Vehicle, load_vehicle
 from nmpc_control.scenario import load_scenario
 from nmpc_control.state import POSITION, ROLL, VELOCITY, YAW, YAW_RATE, hover_input, hover_state
+from uav_sim.closed_loop.bench.parameters import bench_parameters
 from uav_sim.closed_loop.bench.problem import Problem, Recorder
 from uav_sim.closed_loop.bench.random_problems import reference_states
-from uav_sim.closed_loop.bench.recording import PLANT, exact_solver
+from uav_sim.closed_loop.bench.recording import exact_solver
 
 VEHICLE = "paper"  # its lags are the fastest of all presets
 SECONDS = 1.0  # [s] over which errors add up
@@ -110,7 +111,7 @@ def _seconds(step: ca.Function, vehicle: Vehicle) -> float:
 
 def _solve_ms(dt: float, integrator: str, count: int, repeats: int) -> float:
     """Return the median time [ms] of a converged solve over the paper's horizon of 6 s."""
-    parameters = load_parameters(PLANT)
+    parameters = bench_parameters()
     solver = replace(parameters.solver, integrator=integrator, dt=dt, horizon=round(_HORIZON / dt))
     nmpc = Nmpc(replace(parameters, solver=solver, vehicle=load_vehicle(VEHICLE)))
     nmpc.solver = recorder = Recorder(exact_solver(nmpc.structure))

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nmpc_control.params import load_parameters
 from nmpc_control.scenario import load_scenario
 from nmpc_control.timing import Motion, Timing
-from uav_sim.closed_loop.bench.recording import PLANT, exact_solver, record, structure_of
+from uav_sim.closed_loop.bench.parameters import bench_parameters
+from uav_sim.closed_loop.bench.recording import exact_solver, record, structure_of
 
 PRESETS = (("position_priority", 1.5), ("velocity_priority", 3.0))  # mean speed [m/s]
 
@@ -39,6 +39,8 @@ class Lap:
 class _Repeated:
     """A timing that runs over the curve again and again."""
 
+    continuous = True
+
     def __init__(self, once: Timing, times: int) -> None:
         self._once = once
         self.duration = times * once.duration
@@ -52,7 +54,7 @@ def lap(preset: str, speed: float) -> Lap:
     scenario = load_scenario("hexagon", speed=speed)
     once = scenario.trajectory
     thrice = replace(scenario, trajectory=replace(once, timing=_Repeated(once.timing, 3)))
-    parameters = load_parameters(PLANT, preset)
+    parameters = bench_parameters(preset)
     flight = record(thrice, parameters, exact_solver(structure_of(parameters)))
     start = flight.log.clock_start + once.duration
     truths = [t for t in flight.log.truths if start <= t.t <= start + once.duration]

@@ -34,8 +34,7 @@ class PaperBackend:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        avoidance = parameters.avoidance
-        self._margin = parameters.vehicle.radius + avoidance.safety_distance + avoidance.inflation
+        self._margin = parameters.vehicle.radius + parameters.avoidance.safety_distance
         self._formulations: Dict[Tuple[int, bool], PaperFormulation] = {}
         self._problem: Optional[Problem] = None
         self._guess: Optional[PaperGuess] = None

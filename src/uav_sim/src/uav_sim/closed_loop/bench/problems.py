@@ -6,12 +6,13 @@ from typing import Dict, List, Optional
 
 import numpy as np
 
-from nmpc_control.ocp import SLOT_SIZE
-from nmpc_control.params import load_parameters
+from nmpc_control.ocp import PARTS, SLOT_SIZE
 from nmpc_control.scenario import load_scenario
+from nmpc_control.slots import clearance
 from nmpc_control.state import NU, NX, POSITION
+from uav_sim.closed_loop.bench.parameters import bench_parameters
 from uav_sim.closed_loop.bench.problem import Problem
-from uav_sim.closed_loop.bench.recording import PLANT, exact_solver, record, structure_of
+from uav_sim.closed_loop.bench.recording import exact_solver, record, structure_of
 from uav_sim.closed_loop.bench.scenes import scatter
 
 KINDS = ("hexagon", "multi_obstacle", "obstacles_32", "push", "cold_start")
@@ -40,7 +41,7 @@ def recorded_problems(
     }
     result = {}
     for kind, (scenario, pushes_seed) in flights.items():
-        parameters = load_parameters(PLANT, scenario.weights)
+        parameters = bench_parameters(scenario.weights)
         solver = exact_solver(structure_of(parameters))
         flight = record(scenario, parameters, solver, pushes_seed, until)
         rate = parameters.solver.budget.rate
@@ -60,10 +61,9 @@ def recorded_problems(
 def in_reach(problem: Problem, positions: np.ndarray) -> bool:
     """Return whether the potential of any obstacle acts at positions (M, 3) of stages 0..M-1."""
     slots = problem.instance.stages[NX + NU :].reshape(-1, SLOT_SIZE, problem.structure.horizon + 1)
-    slots = slots[:, :, : len(positions)]
-    offset = positions.T - slots[:, :3]
-    squares = offset[:, 0] ** 2 + offset[:, 1] ** 2 + slots[:, 3] * offset[:, 2] ** 2
-    return bool(np.any(np.sqrt(squares) * slots[:, 4] < 1.0))
+    slots = slots[:, :, : len(positions)].swapaxes(1, 2)
+    begins = problem.instance.theta[PARTS["cushion"]]
+    return bool(np.any(clearance(slots, positions) < begins))
 
 
 def _cold_starts(problems: List[Problem], seed: int) -> List[Problem]:

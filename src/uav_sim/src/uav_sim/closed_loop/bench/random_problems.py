@@ -12,11 +12,12 @@ import numpy as np
 
 from nmpc_control.nmpc import Nmpc
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.params import Parameters, load_parameters, load_weights
+from nmpc_control.params import Parameters, load_weights
 from nmpc_control.scenario import Scenario, load_scenario
 from nmpc_control.state import NX, POSITION, VELOCITY, YAW, YAW_RATE, hover_input
+from uav_sim.closed_loop.bench.parameters import bench_parameters
 from uav_sim.closed_loop.bench.problem import Problem, Recorder
-from uav_sim.closed_loop.bench.recording import PLANT, exact_solver
+from uav_sim.closed_loop.bench.recording import exact_solver
 
 _SCENARIOS = ("hexagon", "multi_obstacle", "one_obstacle", "spline", "circle_xy", "go_to_point")
 _WEIGHTS = ("indoor", "outdoor", "position_priority", "velocity_priority")
@@ -46,7 +47,7 @@ def random_problems(seed: int, count: int, bounded: float = 0.0) -> List[Problem
     """
     rng = np.random.default_rng(seed)
     scenarios = [load_scenario(name) for name in _SCENARIOS]
-    nmpc = Nmpc(load_parameters(PLANT))
+    nmpc = Nmpc(bench_parameters())
     nmpc.solver = Recorder(exact_solver(nmpc.structure))
     weights = [load_weights(name) for name in _WEIGHTS]
     usual, result = nmpc.parameters, []

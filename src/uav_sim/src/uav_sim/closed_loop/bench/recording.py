@@ -10,11 +10,10 @@ from nmpc_control.ocp import Structure
 from nmpc_control.params import Parameters
 from nmpc_control.scenario import Scenario
 from nmpc_control.sqp import SqpSolver
+from uav_sim.closed_loop.bench.parameters import PLANT
 from uav_sim.closed_loop.bench.problem import Recorder
 from uav_sim.closed_loop.loop import ClosedLoop, Log, fly
 from uav_sim.closed_loop.simulate import new_loop
-
-PLANT = "dji_hil"
 
 _PUSH = 3.0  # [m/s] sudden change of the velocity
 _PUSHES_AT = (0.15, 0.35, 0.55, 0.75)  # part of the trajectory's time

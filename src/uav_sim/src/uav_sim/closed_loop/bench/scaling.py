@@ -8,12 +8,12 @@ from typing import Dict, List, Sequence
 import numpy as np
 
 from nmpc_control.nmpc import Nmpc
-from nmpc_control.params import load_parameters
 from nmpc_control.scenario import Scenario, load_scenario
 from nmpc_control.state import hover_input
+from uav_sim.closed_loop.bench.parameters import bench_parameters
 from uav_sim.closed_loop.bench.problem import Problem, Recorder
 from uav_sim.closed_loop.bench.random_problems import reference_states
-from uav_sim.closed_loop.bench.recording import PLANT, exact_solver
+from uav_sim.closed_loop.bench.recording import exact_solver
 from uav_sim.closed_loop.bench.scenes import WIDE, scatter
 
 _PERIOD = 0.05  # [s] between two solves
@@ -44,7 +44,7 @@ def by_obstacles(sizes: Sequence[int], count: int, repeats: int, seed: int) -> D
 
 def _problems(scenario: Scenario, horizon: int, slots: int, count: int) -> List[Problem]:
     """Return warm-started problems spread over a scenario, with another structure."""
-    parameters = load_parameters(PLANT, scenario.weights)
+    parameters = bench_parameters(scenario.weights)
     solver = replace(parameters.solver, horizon=horizon, obstacle_slots=slots)
     nmpc = Nmpc(replace(parameters, solver=solver))
     nmpc.solver = recorder = Recorder(exact_solver(nmpc.structure))

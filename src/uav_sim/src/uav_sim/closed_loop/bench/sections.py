@@ -7,7 +7,6 @@ from typing import Any, Callable, Dict, List, Tuple
 
 from rich.progress import Progress
 
-from nmpc_control.params import load_parameters
 from nmpc_control.scenario import load_scenario
 from uav_sim.closed_loop.bench import integrators, node_memory, scaling, startup
 from uav_sim.closed_loop.bench.agreement import draw, study, summary
@@ -21,8 +20,8 @@ from uav_sim.closed_loop.bench.flights import (
 )
 from uav_sim.closed_loop.bench.laps import lap
 from uav_sim.closed_loop.bench.paper_flight import reproduction
+from uav_sim.closed_loop.bench.parameters import PLANT, bench_parameters
 from uav_sim.closed_loop.bench.problems import recorded_problems
-from uav_sim.closed_loop.bench.recording import PLANT
 from uav_sim.closed_loop.bench.scenes import circuit
 
 Result = Dict[str, Any]
@@ -34,9 +33,7 @@ def backends(effort: Effort, seed: int, bar: Progress) -> Result:
     problems = recorded_problems(effort.problems, seed, effort.until)
     count = sum(len(group) for group in problems.values())
     task = bar.add_task("backends", total=count)
-    comparison = compare(
-        problems, load_parameters(PLANT), effort.repeats, lambda: bar.advance(task)
-    )
+    comparison = compare(problems, bench_parameters(), effort.repeats, lambda: bar.advance(task))
     return {
         "rows": comparison.rows(),
         "python_share": comparison.python_share(),

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""Ways round that one local solution does not find, and a side that is kept."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from nmpc_control.nmpc import Nmpc
+from nmpc_control.obstacle import Obstacle
+from nmpc_control.params import load_parameters
+from nmpc_control.state import hover_input, hover_state
+
+SPEED, TICK = 1.5, 0.1  # [m/s], [s]
+BALL = Obstacle("ball", np.array([5.0, 0.0, 5.0]), np.array([0.5]))
+POLE = Obstacle("pole", np.array([5.0, 0.0, 5.0]), np.array([0.5, 40.0]), "cylinder")
+MARGIN = 1.0  # [m] of the centre from a surface
+
+
+@pytest.fixture(scope="module")
+def nmpc() -> Nmpc:
+    return Nmpc(with_guides(1))
+
+
+def with_guides(count, backend="compiled"):
+    usual = load_parameters()
+    patient = dataclasses.replace(usual.solver, backend=backend).with_budget(time_budget=10.0)
+    avoidance = dataclasses.replace(usual.avoidance, guides=count)
+    return dataclasses.replace(usual, solver=patient, avoidance=avoidance)
+
+
+def fly(nmpc, guides, obstacles, ticks, y=0.0, noise=0.0):
+    """Fly the model straight along x from rest; returns states (ticks + 1, 10) and the plans."""
+    nmpc.use(with_guides(guides))
+    nmpc.reset()
+    nmpc._other_ways = type(nmpc._other_ways)(guides, shooting=True)
+    rng = np.random.default_rng(3)
+    x, u = hover_state(np.array([0.0, y, 5.0])), hover_input()
+    states, plans = [x], []
+    for i in range(ticks):
+        x_ref = np.zeros((nmpc.structure.horizon + 1, 10))
+        x_ref[:, 0] = SPEED * (TICK * i + nmpc.structure.dt * np.arange(len(x_ref)))
+        x_ref[:, 2], x_ref[:, 6] = 5.0, SPEED
+        plan = nmpc.solve(TICK * i, x, x_ref, u, obstacles)
+        assert plan.found
+        u, x = plan.inputs[0], plan.states[1].copy()
+        x[:3] += noise * rng.normal(size=3)
+        states.append(x)
+        plans.append(plan)
+    return np.array(states), plans
+
+
+def side(plan):
+    """Return where (2,) [1] a plan is, seen along x, where it passes the ball; None if nowhere."""
+    passing = np.nonzero(plan.states[:, 0] >= BALL.position[0])[0]
+    if not len(passing):
+        return None
+    offset = plan.states[passing[0], 1:3] - BALL.position[1:]
+    return offset / np.linalg.norm(offset)
+
+
+def test_head_on_a_way_is_found_that_the_plain_solver_does_not_see(nmpc):
+    """Exactly in the middle no gradient points to any side."""
+    states, _ = fly(nmpc, 1, (POLE,), 70)
+    assert states[-1, 0] > POLE.position[0] + 1.5
+    assert POLE.distance(states[:, :3]).min() > MARGIN
+    assert nmpc.held_up_by == ()
+    stays, _ = fly(nmpc, 0, (POLE,), 45)
+    assert stays[-1, 0] < POLE.position[0] - MARGIN, "the twin stands before it"
+    assert nmpc.held_up_by == ("pole",)
+
+
+def test_the_side_is_kept(nmpc):
+    """Noise that favours now one side and now another flips it never."""
+    _, plans = fly(nmpc, 1, (BALL,), 40, noise=0.01)
+    chosen = [way for way in map(side, plans) if way is not None]
+    assert len(chosen) > 30
+    settled = chosen[5:]  # all sides have had their turn
+    assert min(float(way @ settled[-1]) for way in settled) > 0.7
+    assert nmpc._other_ways.changes <= 3
+
+
+def test_what_does_not_stand_in_the_way_costs_nothing(nmpc):
+    beside = dataclasses.replace(BALL, position=np.array([5.0, 2.5, 5.0]))
+    fly(nmpc, 1, (beside,), 1)
+    solves = []
+    solver = nmpc.solver
+
+    class Counting:
+        def solve(self, instance, guess=None):
+            solves.append(1)
+            return solver.solve(instance, guess)
+
+    nmpc.solver = Counting()
+    try:
+        fly(nmpc, 1, (beside,), 4)
+        assert len(solves) == 4
+        solves.clear()
+        fly(nmpc, 1, (BALL,), 4)
+        assert 4 + 3 < len(solves) <= 4 + 2 * (8 + 3), "all sides at first, then one now and then"
+    finally:
+        nmpc.solver = solver
+
+
+def test_a_dead_end_is_left_for_the_side_that_is_open(nmpc):
+    """From the left of the middle the near side is left, but a wall stands there."""
+    wall = Obstacle("wall", np.array([5.0, 3.0, 5.0]), np.array([2.9]))
+    states, _ = fly(nmpc, 1, (BALL, wall), 75, y=0.05)
+    least = min(o.distance(states[:, :3]).min() for o in (BALL, wall))
+    assert least > MARGIN
+    assert states[-1, 0] > BALL.position[0] + 1.0
