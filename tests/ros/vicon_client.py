@@ -43,6 +43,15 @@ class ViconClient(Client):
     def silence(self):
         self._inject("topic_dropped", "{topic: vicon}", 0.0, 0.0)
 
+    def start(self):
+        """Ask until it is granted: on a slow machine READY may end before the question comes."""
+        end = rospy.Time.now() + rospy.Duration(30.0)
+        answer = self.ask("start")
+        while not answer[0] and rospy.Time.now() < end:
+            rospy.sleep(0.2)
+            answer = self.ask("start")
+        return answer
+
     def fly(self, waypoints):
         """Fly a trajectory; return whether it was flown to its end, and a sentence."""
         action = actionlib.SimpleActionClient("fly_trajectory", FlyTrajectoryAction)
@@ -52,8 +61,12 @@ class ViconClient(Client):
         result = action.get_result()
         return [result.arrived, result.message]
 
-    def select(self, name):
-        answer = self._select(name)
+    def select(self, name, patience=0.0):
+        """Ask for a source until it is granted: on a slow machine one may be late at times."""
+        end, answer = rospy.Time.now() + rospy.Duration(patience), self._select(name)
+        while not answer.success and rospy.Time.now() < end:
+            rospy.sleep(0.1)
+            answer = self._select(name)
         return [answer.success, answer.message]
 
     def off(self):
@@ -77,17 +90,19 @@ def main():
     rospy.sleep(0.5)
     seen["start_silent"] = client.ask("start")
     client.clear("")
-    seen["start"] = client.hover()
+    seen["start"] = client.start()
+    client.wait("HOVERING")
+    rospy.sleep(1.0)
     seen["flown"] = client.fly([Point(0.0, 0.0, 1.5), Point(*TARGET)])
     rospy.sleep(1.0)
     seen["off"] = client.off()
     begun = len(client.statuses)
     seen["select_unheard"] = client.select("gps")
-    seen["select"] = client.select("world_position")
+    seen["select"] = client.select("world_position", 10.0)
     rospy.sleep(3.0)
     seen["off_beside"] = client.off()
     seen["source_beside"] = client.source
-    seen["back"] = client.select("vicon")
+    seen["back"] = client.select("vicon", 10.0)
     rospy.sleep(3.0)
     seen["off_back"] = client.off()
     seen["modes_switching"] = sorted({status.mode for status in client.statuses[begun:]})
@@ -97,8 +112,7 @@ def main():
     seen["reason"] = client.statuses[-1].reason
     seen["modes"] = client.modes()
     client.clear("")
-    rospy.sleep(1.5)
-    seen["start_again"] = client.ask("start")
+    seen["start_again"] = client.start()
     client.wait("HOVERING", 10.0)
     seen["land"] = client.ask("land")
     client.wait("READY", 30.0)  # at once after WAITING, which says that it has landed
