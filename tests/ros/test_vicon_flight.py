@@ -19,6 +19,7 @@ def test_a_flight_indoors_follows_vicon_changes_its_source_and_ends_where_vicon_
     assert not granted
     assert "position is " in words
     assert seen["start"] == [True, "taking off"], "no GPS is needed"
+    assert seen["flown"][0], seen["flown"]
     assert seen["off"] < 0.15
     assert seen["select_unheard"] == [
         False,
@@ -31,8 +32,11 @@ def test_a_flight_indoors_follows_vicon_changes_its_source_and_ends_where_vicon_
     assert seen["back"][0], seen["back"]
     assert seen["off_back"] < 0.15
     assert seen["modes_switching"] == [HOVERING]
-    assert 0.2 < seen["brake_after"] < 1.0
+    assert 0.2 < seen["brake_after"] < 2.0
     assert "position" in seen["reason"]
     assert seen["modes"][-2:] in (["BRAKING", "RELEASED"], ["HOVERING", "RELEASED"])
+    assert seen["start_again"] == [True, "braking to hover"]
+    assert seen["land"] == [True, "landing"]
+    assert seen["height"] < 0.05
     assert seen["collisions"] == 0
     assert "Traceback" not in ros.output_of_all()

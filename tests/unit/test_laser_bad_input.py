@@ -166,7 +166,6 @@ def test_the_centre_is_where_it_is_and_not_nearer(distance, bearing, radius, see
     ("line", "changed_line", "named"),
     [
         ("max_age: 0.3", "max_age: -1.0", "pose.max_age"),
-        ("position_source: gps", "position_source: stars", "position_source"),
         ("radius_min: 0.05", "radius_min: 0.5", "shapes.radius"),
         ("confirm_scans: 8", "confirm_scans: 4", "tracks.confirm_scans"),
         ("  gate: 13.8", "  gat: 13.8", "tracks.gat"),

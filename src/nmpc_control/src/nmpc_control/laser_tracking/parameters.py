@@ -100,7 +100,6 @@ class LaserTrackerParameters:
     """Everything the laser tracker needs."""
 
     world_frame: str = field()
-    position_source: str = field(metadata={"choices": ("gps", "external")})
     scan_timeout: float = _positive()  # [s] without scans before it is said
     mount: Mount = field()
     pose: PoseParameters = field()

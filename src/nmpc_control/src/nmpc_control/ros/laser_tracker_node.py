@@ -5,12 +5,11 @@ Needs neither controller nor guard: its pose comes from the telemetry.
 
 ROS Subscribers:
     scan (sensor_msgs/LaserScan): the newest one is taken, older ones that wait are skipped.
-    dji_sdk/{attitude, imu, velocity, local_position}, or ``world_position`` instead of
-    local_position: the pose.
+    the pose: see ``state_port``; nmpc/position_source: its source, as flight_guard has it.
 ROS Publishers:
     obstacles (nmpc_msgs/ObstacleArray): with each scan, stamped as the scan, all confirmed tracks.
     /diagnostics: scans taken, refused and skipped, tracks.
-ROS Parameters: none; ``config/laser_tracker.yaml`` has them.
+ROS Parameters: those of ``state_port``; the others are in ``config/laser_tracker.yaml``.
 """
 
 import math
@@ -18,14 +17,13 @@ import sys
 import threading
 import time
 import traceback
-from typing import Any, Callable, Optional
+from typing import Optional
 
 import diagnostic_updater
 import numpy as np
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
-from geometry_msgs.msg import PointStamped, QuaternionStamped, Vector3Stamped
-from sensor_msgs.msg import Imu, LaserScan
+from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 
 from nmpc_control.errors import NmpcError
@@ -34,10 +32,11 @@ from nmpc_control.laser_tracking.poses import PoseHistory
 from nmpc_control.laser_tracking.scan import Scan, ScanError
 from nmpc_control.laser_tracking.tracker import RESTART, LaserTracker
 from nmpc_control.ros.conversions import obstacles_to_msg
+from nmpc_control.ros.source_switch import TOPIC, follow
+from nmpc_control.ros.state_port import StatePort
 from nmpc_control.ros.subscriptions import Subscriptions
-from nmpc_msgs.msg import ObstacleArray
+from nmpc_msgs.msg import ObstacleArray, PositionSource
 
-_POSITION_TOPICS = {"gps": "dji_sdk/local_position", "external": "world_position"}
 _WAIT = 0.2  # [s] of wall time for a scan, before diagnostics get their turn
 
 
@@ -49,6 +48,9 @@ class LaserTrackerNode:
         self.tracker = LaserTracker(parameters)
         self._poses = PoseHistory(parameters.pose)
         self._lock = threading.Lock()  # of the poses
+        self._state = StatePort(
+            self._poses.estimator, parameters.world_frame, self._lock, self._poses.add_attitude
+        )
         self._scan: Optional[LaserScan] = None
         self._arrived = threading.Event()
         self._now = 0.0  # [s]
@@ -103,35 +105,15 @@ class LaserTrackerNode:
             rospy.logwarn("the clock jumped backwards")
             with self._lock:
                 self._poses.forget()
+                self._state.sources.forget()
             self.tracker.forget()
             self._heard = -math.inf
         self._now = now
 
     def _subscribe(self) -> None:
-        poses, estimator = self._poses, self._poses.estimator
-
-        def on_attitude(m: QuaternionStamped) -> None:
-            q = m.quaternion
-            poses.add_attitude(_time(m.header), (q.x, q.y, q.z, q.w))
-
-        def on_imu(m: Imu) -> None:
-            w = m.angular_velocity
-            estimator.add_imu(_time(m.header), (w.x, w.y, w.z))
-
-        def on_velocity(m: Vector3Stamped) -> None:
-            estimator.add_velocity(_time(m.header), (m.vector.x, m.vector.y, m.vector.z))
-
-        def on_position(m: PointStamped) -> None:
-            estimator.add_position(_time(m.header), (m.point.x, m.point.y, m.point.z))
-
         subscriptions = Subscriptions()
-        for topic, kind, callback in (
-            ("dji_sdk/attitude", QuaternionStamped, on_attitude),
-            ("dji_sdk/imu", Imu, on_imu),
-            ("dji_sdk/velocity", Vector3Stamped, on_velocity),
-            (_POSITION_TOPICS[self.parameters.position_source], PointStamped, on_position),
-        ):
-            subscriptions.add(topic, kind, self._locked(callback))
+        self._state.subscribe(subscriptions)
+        subscriptions.add(TOPIC, PositionSource, lambda m: follow(self._state, m), queue_size=10)
         subscriptions.add("scan", LaserScan, self._on_scan)
 
     def _on_scan(self, message: LaserScan) -> None:
@@ -139,13 +121,6 @@ class LaserTrackerNode:
             self.tracker.counts["skipped"] += 1
         self._scan = message
         self._arrived.set()
-
-    def _locked(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
-        def store(message: Any) -> None:
-            with self._lock:
-                callback(message)
-
-        return store
 
     def _diagnose(
         self, status: diagnostic_updater.DiagnosticStatusWrapper
@@ -177,11 +152,6 @@ def scan_from_msg(message: LaserScan) -> Scan:
         range_max=message.range_max,
         ranges=np.array(message.ranges, dtype=float),
     )
-
-
-def _time(header: Header) -> float:
-    """Return the message's time [s]; one from the future counts as now."""
-    return min(header.stamp.to_sec(), rospy.Time.now().to_sec())
 
 
 def main() -> None:

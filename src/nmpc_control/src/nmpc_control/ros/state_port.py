@@ -44,12 +44,20 @@ class StatePort:
     """Subscribes; ``sources`` is to be used under ``lock`` only."""
 
     def __init__(
-        self, estimator: Estimator, world_frame: str, lock: Optional[threading.Lock] = None
+        self,
+        estimator: Estimator,
+        world_frame: str,
+        lock: Optional[threading.Lock] = None,
+        add_attitude: Optional[Callable[[float, Tuple[float, ...]], bool]] = None,
     ) -> None:
-        """Read the parameters; raises ConfigError."""
+        """Read the parameters; raises ConfigError.
+
+        ``add_attitude`` is called with attitudes in place of the estimator's own method.
+        """
         parameters = node_sources()
         self.lock = lock or threading.Lock()
         self.sources = StateSources(parameters, estimator)
+        self._add_attitude = add_attitude
         self._world_frame = world_frame.strip("/")
         self._vicon_frame = parameters.vicon_frame.strip("/")
         self._jumps: Dict[str, int] = {}  # of each source, as far as they were told
@@ -104,8 +112,8 @@ class StatePort:
         return store
 
     def _on_attitude(self, message: QuaternionStamped) -> None:
-        estimator = self.sources.estimator
-        estimator.add_attitude(stamp_of(message.header), _xyzw(message.quaternion))
+        add = self._add_attitude or self.sources.estimator.add_attitude
+        add(stamp_of(message.header), _xyzw(message.quaternion))
 
     def _on_imu(self, message: Imu) -> None:
         rates = _xyz(message.angular_velocity)
