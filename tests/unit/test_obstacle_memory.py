@@ -51,6 +51,7 @@ BAD = [
     ({"growth": math.nan}, "not finite"),
     ({"path": (4.0, 0.0, 2.0)}, "path"),
     ({"path": (4.0, 0.0, 2.0), "path_dt": -0.1}, "path"),
+    ({"path": (5.0, 0.0, 2.0), "path_dt": 1e-20}, "path"),
     ({"path": (4.0, math.nan, 2.0), "path_dt": 0.1}, "path"),
     ({"path": (400.0, 0.0, 2.0), "path_dt": 0.1}, "path"),
     ({"path": (4.9, 0.0, 2.0) * 201, "path_dt": 0.1}, "path"),
@@ -58,6 +59,12 @@ BAD = [
     ({"stamp": 0.0}, "too old"),
     ({"stamp": 9.8}, "backwards in time"),
 ]
+
+
+def test_the_closest_points_of_a_path_that_are_believed():
+    path = BIRD._replace(path=(5.0, 0.0, 2.0), path_dt=1e-3)
+    assert fault(path) == ""
+    assert fault(path._replace(path_dt=0.9e-3)) == "path"
 
 
 @pytest.mark.parametrize(("change", "kind"), BAD)
