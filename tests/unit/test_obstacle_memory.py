@@ -177,9 +177,22 @@ def test_known_ones_give_way_to_what_is_heard(memory):
     say(memory, 10.0, BIRD, TREE)
     assert names(memory) == ["wall", "bird", "tree"]
     say(memory, 10.1)
-    assert names(memory) == ["tree", "wall"], "the bird was seen to leave its place"
-    memory.set_known(known)
-    assert names(memory) == ["tree", "wall"]
+    assert names(memory) == ["bird", "tree", "wall"]
+
+
+@pytest.mark.parametrize("end", ["absent", "forgotten", "a jump of the clock"])
+def test_one_moving_report_hides_a_known_one_only_for_as_long_as_it_is_kept(memory, end):
+    memory.set_known([Obstacle("bird", np.zeros(3), np.ones(1))])
+    (seen,) = say(memory, 10.0, BIRD)
+    assert seen.stamp == 10.0, "while it is reported it is not in two places"
+    if end == "absent":
+        say(memory, 10.1)
+    elif end == "forgotten":
+        memory.forget("/tracker")
+    else:
+        memory.start_anew()
+    (known,) = memory.obstacles(10.2)
+    assert (known.stamp, known.position[0]) == (None, 0.0)
 
 
 def test_no_more_than_the_limit_is_known(memory):

@@ -11,7 +11,7 @@ which the guard answers by braking, until something new is heard or the sender i
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_params import ObstacleParameters
@@ -55,7 +55,6 @@ class ObstacleMemory:
         self.rejected: "Counter[str]" = Counter()
         self.heard = -math.inf  # [s] when the newest message came
         self._known: Dict[str, Obstacle] = {}
-        self._gone_from_start: Set[str] = set()  # known ones that were seen to move
         self._tracks: Dict[str, Dict[str, _Track]] = {}  # by sender and id
         self._heard: Dict[str, float] = {}  # [s] by sender of whom something is known
         self._owner: Dict[str, str] = {}  # sender whose obstacle carries the bare id
@@ -65,7 +64,8 @@ class ObstacleMemory:
     def set_known(self, obstacles: Sequence[Obstacle]) -> None:
         """Replace those that are known without being heard of, as from a scenario.
 
-        They stand still. One of the same id that a sender reports takes the place of the known.
+        They stand still. One of the same id takes the place of the known while a sender reports it:
+        one that moved and is seen no more may be where the scenario says.
         """
         still = [o if o.stamp is None else replace(o, stamp=None) for o in obstacles]
         self.reject(NO_ROOM, max(0, len(still) - MAX_OBSTACLES))
@@ -132,7 +132,6 @@ class ObstacleMemory:
             after = {name: track for name, track in before.items() if not track.moves}
             self._replace(-math.inf, sender, before, after)
         self.heard = self._due = -math.inf
-        self._gone_from_start.clear()
 
     def obstacles(self, t: float) -> Tuple[Obstacle, ...]:
         """Return what is known at ``t`` [s]: the same tuple for as long as nothing changes."""
@@ -173,8 +172,6 @@ class ObstacleMemory:
     def _track(self, sender: str, sighting: Sighting) -> _Track:
         owner = self._owner.setdefault(sighting.id, sender)
         name = sighting.id if owner == sender else f"{sighting.id}@{sender}"
-        if sighting.moves and sighting.id in self._known:
-            self._gone_from_start.add(sighting.id)
         return _Track(sighting, to_obstacle(sighting, name))
 
     def _replace(
@@ -199,7 +196,7 @@ class ObstacleMemory:
     def _current(self, t: float) -> Iterable[Obstacle]:
         heard = {name for tracks in self._tracks.values() for name in tracks}
         for name, obstacle in self._known.items():
-            if name not in heard and name not in self._gone_from_start:
+            if name not in heard:
                 yield obstacle
         for tracks in self._tracks.values():
             for track in tracks.values():
