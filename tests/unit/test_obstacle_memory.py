@@ -246,10 +246,12 @@ LISTS = st.tuples(st.sampled_from(["/x", "/y"]), st.floats(0.0, 3.0), st.lists(E
 
 @given(st.lists(LISTS, max_size=8))
 def test_whatever_is_said_only_sound_obstacles_are_known(said):
-    memory, t = ObstacleMemory(PARAMS), 10.0
+    memory, t, late = ObstacleMemory(PARAMS), 10.0, {}
     for sender, pause, entries in said:
         t += pause
-        obstacles = say(memory, t, *entries, sender=sender)
+        refused = memory.hear(t, sender, [(s, fault(s)) for s in entries])
+        late[sender] = {name for name, kind in refused if kind == "too old"}
+        obstacles = memory.obstacles(t)
         assert len({o.id for o in obstacles}) == len(obstacles)
         for o in obstacles:
             times = t + np.arange(0.0, 6.0, 0.5)
@@ -259,7 +261,10 @@ def test_whatever_is_said_only_sound_obstacles_are_known(said):
         assert memory.obstacles(t) is obstacles
         moving = [o for o in obstacles if o.stamp is not None]
         is_old = any(t - o.stamp > PARAMS.stale_after for o in moving)
-        assert bool(memory.stale(t)) == is_old
+        moving_ids = {o.id.split("@")[0] for o in moving}
+        assert memory.stale(t) or not is_old
+        assert memory.stale(t) or not set().union(*late.values()) - moving_ids
+        assert is_old or any(late.values()) or not memory.stale(t)
 
 
 ANGLES = st.floats(-math.pi, math.pi)
