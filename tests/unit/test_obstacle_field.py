@@ -8,6 +8,7 @@ import pytest
 
 from nmpc_control.obstacle import MAX_GROWTH, MIN_PATH_DT, Obstacle
 from nmpc_control.obstacle_field import ObstacleField
+from nmpc_control.obstacle_sighting import Sighting, fault
 
 TIMES = np.linspace(0.5, 6.0, 23)
 
@@ -83,6 +84,12 @@ def test_a_path_of_hardly_any_spacing_is_unusable_and_breaks_nothing(path_dt):
     field = ObstacleField([guest, replace(guest, id="twin", path_dt=MIN_PATH_DT)])
     assert field.unusable == ("guest",)
     np.testing.assert_array_equal(field.centres(TIMES), np.zeros((2, len(TIMES), 3)))
+
+
+def test_the_closest_points_of_a_path_that_are_believed():
+    path = Sighting("bird", "sphere", (0.3,), (5.0, 0.0, 2.0), path=(5.0, 0.0, 2.0), path_dt=1e-3)
+    assert fault(path) == ""
+    assert fault(path._replace(path_dt=0.9e-3)) == "path"
 
 
 def test_no_obstacle_is_no_row():

@@ -61,12 +61,6 @@ BAD = [
 ]
 
 
-def test_the_closest_points_of_a_path_that_are_believed():
-    path = BIRD._replace(path=(5.0, 0.0, 2.0), path_dt=1e-3)
-    assert fault(path) == ""
-    assert fault(path._replace(path_dt=0.9e-3)) == "path"
-
-
 @pytest.mark.parametrize(("change", "kind"), BAD)
 def test_a_bad_entry_leaves_the_last_good_one_and_the_others(memory, change, kind):
     before = say(memory, 10.0, BIRD, TREE)

@@ -6,7 +6,8 @@ counted and leaves the last good knowledge of its obstacle in place, which grows
 stands still never ages. One that moves grows: at the rate its sender gave, and at least at the
 default rate once nothing was heard of it for ``age_limit``; after ``stale_after`` it is stale,
 which the guard answers by braking, until something new is heard or the sender is forgotten. So is
-one that is too old when it is heard of first: where it is now is not known either.
+one that is too old, or in a frame that was not known, when it is heard of first: where it is now is
+not known either.
 """
 
 import math
@@ -18,12 +19,13 @@ from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_params import ObstacleParameters
 from nmpc_control.obstacle_sighting import MAX_OBSTACLES, Sighting, to_obstacle
 
-DUPLICATE, FUTURE, PAST, BACKWARDS, NO_ROOM = (
+DUPLICATE, FUTURE, PAST, BACKWARDS, NO_ROOM, UNPLACED = (
     "duplicate id",
     "from the future",
     "too old",
     "backwards in time",
     "no room",
+    "frame",  # not known at the time of the entry
 )
 
 
@@ -58,9 +60,7 @@ class ObstacleMemory:
         self._known: Dict[str, Obstacle] = {}
         self._tracks: Dict[str, Dict[str, _Track]] = {}  # by sender and id
         self._heard: Dict[str, float] = {}  # [s] by sender of whom something is known
-        self._too_old: Dict[
-            str, Dict[str, float]
-        ] = {}  # [s] stamps of what moves unseen, by sender
+        self._unseen: Dict[str, Dict[str, str]] = {}  # why, of what moves, by sender and id
         self._owner: Dict[str, str] = {}  # sender whose obstacle carries the bare id
         self._obstacles: Tuple[Obstacle, ...] = ()
         self._due = -math.inf  # [s] when the obstacles next change by themselves
@@ -90,7 +90,7 @@ class ObstacleMemory:
         room = MAX_OBSTACLES - len(self._known) - sum(map(len, self._tracks.values()))
         after: Dict[str, _Track] = {}
         refused: List[Tuple[str, str]] = []
-        too_old: Dict[str, float] = {}
+        unseen: Dict[str, str] = {}
         for sighting, found in judged:
             old = before.get(sighting.id)
             if not found and sighting.id in after:
@@ -107,8 +107,9 @@ class ObstacleMemory:
                 found = NO_ROOM if room < 0 else ""
             if found:
                 refused.append((sighting.id, found))
-                if found == PAST:
-                    too_old[sighting.id] = sighting.stamp
+                if found in (PAST, UNPLACED) and sighting.moves:
+                    age = f"{t - sighting.stamp:.1f} s old"
+                    unseen[sighting.id] = age if found == PAST else "of no use: frame not known"
             elif old is not None and old.sighting == sighting:
                 after[sighting.id] = old
             else:
@@ -120,7 +121,7 @@ class ObstacleMemory:
         self.heard = t
         self._replace(t, sender, before, after)
         moving = {name for name, track in after.items() if track.moves}
-        self._set_too_old(sender, {n: s for n, s in too_old.items() if n not in moving})
+        self._set_unseen(sender, {n: why for n, why in unseen.items() if n not in moving})
         return refused
 
     def reject(self, kind: str, count: int = 1) -> None:
@@ -133,16 +134,17 @@ class ObstacleMemory:
         before = self._tracks.get(sender, {})
         after = {n: track for n, track in before.items() if name and n != name}
         self._replace(self._heard.get(sender, -math.inf), sender, before, after)
-        old = self._too_old.get(sender, {})
-        self._set_too_old(sender, {n: s for n, s in old.items() if name and n != name})
-        return len({*before, *old} - {*after, *self._too_old.get(sender, {})})
+        unseen = self._unseen.get(sender, {})
+        left = {n: why for n, why in unseen.items() if name and n != name}
+        self._set_unseen(sender, left)
+        return len({*before, *unseen} - {*after, *left})
 
     def start_anew(self) -> None:
         """Forget what carries a time, as after a jump of the clock; what stands still stays."""
         for sender, before in list(self._tracks.items()):
             after = {name: track for name, track in before.items() if not track.moves}
             self._replace(-math.inf, sender, before, after)
-        self._too_old.clear()
+        self._unseen.clear()
         self.heard = self._due = -math.inf
 
     def obstacles(self, t: float) -> Tuple[Obstacle, ...]:
@@ -166,15 +168,15 @@ class ObstacleMemory:
                     return f"{sender} reported moving obstacles and is silent for {silence:.1f} s"
                 age = t - track.obstacle.stamp
                 return f"what {sender} says of obstacle {name} is {age:.1f} s old"
-        for sender, stamps in self._too_old.items():
-            name, stamp = next(iter(stamps.items()))
-            return f"what {sender} says of obstacle {name} is {t - stamp:.1f} s old"
+        for sender, unseen in self._unseen.items():
+            name, why = next(iter(unseen.items()))
+            return f"what {sender} says of obstacle {name} is {why}"
         return ""
 
-    def _set_too_old(self, sender: str, stamps: Dict[str, float]) -> None:
-        self._too_old.pop(sender, None)
-        if stamps:
-            self._too_old[sender] = stamps
+    def _set_unseen(self, sender: str, unseen: Dict[str, str]) -> None:
+        self._unseen.pop(sender, None)
+        if unseen:
+            self._unseen[sender] = unseen
 
     def summary(self, t: float) -> Summary:
         """Return figures for people at ``t`` [s]."""
