@@ -28,7 +28,7 @@ class Aircraft:
         self.loop = new_loop(load_scenario("hover"), PARAMETERS, "dji_hil", World((), HULL))
         self.loop.aircraft.place(start)
         self.target = target
-        self.traffic = Traffic(TrafficParameters(radius=HULL, growth=0.1, forget_after=30.0))
+        self.traffic = Traffic(TrafficParameters(radius=HULL, growth=0.1))
         self.memory = ObstacleMemory(load_obstacle_parameters())
 
     @property
@@ -51,7 +51,7 @@ class Aircraft:
             plan.dt,
         )
         self.traffic.predict("other", course)
-        (o,), _ = self.traffic.report(t)
+        (o,) = self.traffic.report()
         numbers = [tuple(map(float, a)) for a in (o.size, o.position, o.velocity, o.path.ravel())]
         sighting = Sighting(o.id, o.shape, *numbers, o.path_dt, o.growth, o.stamp)
         self.memory.hear(t, "/nmpc_traffic", [(sighting, "")])

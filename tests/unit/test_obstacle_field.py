@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Obstacles as arrays agree with each one alone, and their spheres touch the true surfaces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from nmpc_control.obstacle import MAX_GROWTH, Obstacle
+from nmpc_control.obstacle import MAX_GROWTH, MIN_PATH_DT, Obstacle
 from nmpc_control.obstacle_field import ObstacleField
 
 TIMES = np.linspace(0.5, 6.0, 23)
@@ -73,6 +75,14 @@ def test_what_is_nowhere_is_named():
     flat = Obstacle("flat", np.zeros(3), np.array([1.0, 0.0, 1.0]), "box")
     assert ObstacleField([*some(), lost, flat]).unusable == ("lost", "flat")
     assert ObstacleField(some()).unusable == ()
+
+
+@pytest.mark.parametrize("path_dt", [1e-300, 1e-20, 0.9 * MIN_PATH_DT])
+def test_a_path_of_hardly_any_spacing_is_unusable_and_breaks_nothing(path_dt):
+    guest = replace(some()[-1], path=np.zeros((3, 3)), path_dt=path_dt)
+    field = ObstacleField([guest, replace(guest, id="twin", path_dt=MIN_PATH_DT)])
+    assert field.unusable == ("guest",)
+    np.testing.assert_array_equal(field.centres(TIMES), np.zeros((2, len(TIMES), 3)))
 
 
 def test_no_obstacle_is_no_row():

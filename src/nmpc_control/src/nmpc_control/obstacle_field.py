@@ -10,7 +10,7 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from nmpc_control.obstacle import MAX_GROWTH, Obstacle, surface_distance
+from nmpc_control.obstacle import MAX_GROWTH, MIN_PATH_DT, Obstacle, surface_distance
 
 SHAPES = ("sphere", "cylinder", "box")
 ROUND = 1.0  # [m] least radius of a sphere that stands for a flat surface
@@ -64,13 +64,13 @@ class ObstacleField:
 
     @cached_property
     def unusable(self) -> Tuple[str, ...]:
-        """Ids of those that are nowhere, or have no size."""
+        """Ids of those that are nowhere, have no size, or a path without a spacing."""
         numbers = np.hstack([self._position, self._velocity, self._size])
         good = np.isfinite(numbers).all(axis=1) & (self._size > 0.0).all(axis=1)
         good &= np.isfinite(self._stamp) & np.isfinite(self._growth)
         for i in self._paths:
             o = self.obstacles[i]
-            good[i] &= bool(np.isfinite(o.path).all()) and o.path_dt > 0.0
+            good[i] &= bool(np.isfinite(o.path).all()) and o.path_dt >= MIN_PATH_DT
         return tuple(name for name, ok in zip(self.ids, good) if not ok)
 
     @property

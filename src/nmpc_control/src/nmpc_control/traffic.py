@@ -2,11 +2,11 @@
 """Other vehicles as obstacles: where each said that it would be, with the time at which it said so.
 
 One that falls silent is reported on with its last words, so that its radius grows and whoever reads
-it reacts to its silence; only after a long time it is left out, which is said.
+it reacts to its silence: it may hover in the way with a dead radio. Only an operator ends that.
 """
 
 from dataclasses import dataclass, field
-from typing import Dict, List, Optional, Tuple
+from typing import Dict, List, Optional
 
 import numpy as np
 
@@ -21,7 +21,6 @@ class TrafficParameters:
 
     radius: float = field(metadata={"min": 1e-2})  # [m] of the hull
     growth: float = field(metadata={"min": 0.0})  # [m/s] of the radius with the age
-    forget_after: float = field(metadata={"min": 1e-2})  # [s] of silence
 
 
 @dataclass(frozen=True)
@@ -51,16 +50,11 @@ class Traffic:
         """Take a vehicle's odometry, which counts where its prediction has ended."""
         self._measured[name] = course
 
-    def report(self, t: float) -> Tuple[List[Obstacle], List[str]]:
-        """Return the vehicles as obstacles at ``t`` [s], and the names of those now left out."""
-        obstacles, gone = [], []
+    def report(self) -> List[Obstacle]:
+        """Return the vehicles as obstacles, each with the time of its own words, however old."""
+        obstacles = []
         for name in sorted({*self._predicted, *self._measured}):
             course = self._newest(name)
-            if t - course.stamp > self.params.forget_after:
-                self._predicted.pop(name, None)
-                self._measured.pop(name, None)
-                gone.append(name)
-                continue
             path, path_dt = course.path, course.path_dt
             if path is None and not course.velocity.any():
                 path, path_dt = course.position[None], 1.0  # or it would count as a thing for ever
@@ -76,10 +70,10 @@ class Traffic:
                     growth=self.params.growth,
                 )
             )
-        return obstacles, gone
+        return obstacles
 
-    def start_anew(self) -> None:
-        """Forget all, as after a jump of the clock."""
+    def forget(self) -> None:
+        """Forget all, as when told to, or after a jump of the clock; who speaks is known again."""
         self._predicted.clear()
         self._measured.clear()
 
