@@ -20,6 +20,7 @@ from nmpc_control.solution import Guess, Solution
 from nmpc_control.state import NU, NX, POSITION, VELOCITY
 
 _PAUSE = 3  # ticks from one try to the next while there is a solution
+_AT_ONCE = 3  # sides tried in a tick without one; the others one a tick, for a tick has to end
 _BETTER = 0.95  # of its cost: what is dearer than this is no reason to change
 _SHORT_CUT, _TOUCH = 1e6, 0.02  # [1/m] of a violation beyond this many metres
 _SIDEWAYS = 1.5  # [m/s] of a way away from the reference
@@ -81,6 +82,7 @@ class OtherWays:
         self.changes = 0
         self._turns = Turns()
         self._ticks = 0
+        self._owed = 0  # sides of a round that began at once which had no turn yet
         self._shooting = shooting
 
     def improve(
@@ -93,19 +95,20 @@ class OtherWays:
             problem: what is solved.
             solution: what it found from its own guess.
             slots: where the obstacles sit in it.
-            warm: whether it began from the last tick's solution; else all sides are tried.
+            warm: whether it began from the last tick's solution; else all sides are tried, some now
+                and one in each of the next ticks.
         """
         reference = eased(problem.x_ref[:, POSITION], problem.x0[POSITION], problem.times)
         spheres = slots.field.spheres(reference, problem.times)
         best = Choice(solution, slots, blocked=conflicts(spheres, problem.margin, reference))
         self._ticks += 1
         at_once = not warm or not solution.found  # else a try now and then is enough
-        due = self._tries and (at_once or self._ticks % _PAUSE == 0)
+        due = self._tries and (at_once or self._owed or self._ticks % _PAUSE == 0)
         if not (due and best.blocked.any()):
             return best
         across = sides(reference[-1] - reference[0])
         slope = _SIDEWAYS * problem.structure.dt
-        for index in self._turns.take(SIDES if at_once and self._shooting else self._tries):
+        for index in self._turns.take(self._count(at_once)):
             way = way_round(spheres, problem.margin, reference, across[index], slope)
             if way is None:
                 continue
@@ -116,6 +119,14 @@ class OtherWays:
                 best = replace(best, solution=other, slots=seats)
                 self.changes += 1
         return best
+
+    def _count(self, at_once: bool) -> int:
+        """Return how many sides to try in this tick; a count, for a clock is never the same."""
+        if not self._shooting:
+            return self._tries
+        count = max(_AT_ONCE, self._tries) if at_once else self._tries
+        self._owed = max(0, (SIDES if at_once else self._owed) - count)
+        return count
 
     def _guess(self, solver: Solver, problem: Posed, way: np.ndarray) -> Guess:
         follow = problem.free(way)
