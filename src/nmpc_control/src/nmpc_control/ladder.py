@@ -30,6 +30,9 @@ class Rung(IntEnum):
     LANDING = 6
 
 
+BRAKES = (Rung.BRAKE, Rung.BRAKE_BLIND)
+
+
 class PlanLadder:
     """The last verified plan, for how long plans have been usable, and where it became too near."""
 

@@ -22,6 +22,7 @@ from nmpc_control.solution import Guess, Solution
 from nmpc_control.state import NU, NX, POSITION, VELOCITY
 
 _PAUSE = 3  # ticks from one try to the next while there is a solution
+_AT_ONCE = 3  # sides tried in a tick without one; the others one a tick, for a tick has to end
 _BETTER = 0.95  # of its cost: what is dearer than this is no reason to change
 _SHORT_CUT, _TOUCH = 1e6, 0.1  # [1/m] of entering margins by more than this many metres
 _BODIES = 8  # times that a way is pushed on where a body turns out to be wider
@@ -101,6 +102,7 @@ class OtherWays:
         self.changes = 0
         self._turns = Turns()
         self._ticks = 0
+        self._owed = 0  # sides of a round that began at once which had no turn yet
         self._shooting = shooting
 
     def improve(
@@ -113,7 +115,8 @@ class OtherWays:
             problem: what is solved.
             solution: what it found from its own guess.
             slots: where the obstacles sit in it.
-            warm: whether it began from the last tick's solution; else all sides are tried.
+            warm: whether it began from the last tick's solution; else all sides are tried, some now
+                and one in each of the next ticks.
         """
         reference = eased(problem.x_ref[:, POSITION], problem.x0[POSITION], problem.times)
         spheres = slots.field.spheres(reference, problem.times)
@@ -122,12 +125,13 @@ class OtherWays:
         self._ticks += 1
         at_once = not warm or not solution.found  # else a try now and then is enough
         is_short_cut = problem.short_cut(field, solution) > 0.0
-        due = self._tries and (at_once or is_short_cut or self._ticks % _PAUSE == 0)
+        now = at_once or is_short_cut or self._owed
+        due = self._tries and (now or self._ticks % _PAUSE == 0)
         if not (due and best.blocked.any()):
             return best
         ways = [self._stay(problem)] if is_short_cut else []
         across = sides(reference[-1] - reference[0])
-        for index in self._turns.take(SIDES if at_once and self._shooting else self._tries):
+        for index in self._turns.take(self._count(at_once)):
             ways.append(self._round(problem, field, reference, across[index]))
         for way in ways:
             if way is None:
@@ -175,6 +179,14 @@ class OtherWays:
         """Return the way of a stop (N + 1, 3) [m]."""
         ahead = _STOPPING * -np.expm1(-(problem.times - problem.times[0]) / _STOPPING)
         return problem.x0[POSITION] + ahead[:, None] * problem.x0[VELOCITY]
+
+    def _count(self, at_once: bool) -> int:
+        """Return how many sides to try in this tick; a count, for a clock is never the same."""
+        if not self._shooting:
+            return self._tries
+        count = max(_AT_ONCE, self._tries) if at_once else self._tries
+        self._owed = max(0, (SIDES if at_once else self._owed) - count)
+        return count
 
     def _guess(self, solver: Solver, problem: Posed, way: np.ndarray) -> Guess:
         follow = problem.free(way)
