@@ -82,6 +82,30 @@ def test_what_stale_obstacles_have_grown_to_does_not_end_the_mode():
     assert output.mode is Mode.BRAKING
 
 
+def met_by_one_whose_sender_is_silent(params):
+    """Hover, with plans that step aside, while a ball comes that was seen last 2 s ago."""
+    step_aside = steered(lambda x, vehicle: [-x[6], 3.0 * (2.0 - x[7]), -x[8]])
+    flight = flight_with(step_aside, params=params)
+    flight.stale, begun = STALE, flight.t
+    ball = sphere([4.5, -0.1, 5.0], 0.5, velocity=np.array([-1.5, 0.0, 0.0]), stamp=flight.t)
+    flight.obstacles = (ball,)
+    flight.run(4.0)
+    return flight, least(flight, ball, begun)
+
+
+def test_what_comes_is_evaded_although_its_sender_is_silent_and_then_it_holds():
+    flight, clearance = met_by_one_whose_sender_is_silent(PARAMS)
+    assert clearance > 0.2
+    output = flight.log[-1][2]
+    assert (output.rung, output.reason) == (Rung.BRAKE, STALE), "it has passed"
+    assert flight.speed < 0.3
+
+
+def test_twin_that_always_brakes_for_what_is_stale_is_met():
+    _, clearance = met_by_one_whose_sender_is_silent(without(advantage=1e3))
+    assert clearance < 0.0
+
+
 def test_stale_obstacles_are_nothing_to_an_aircraft_that_is_not_flown():
     flight = Flight()
     flight.stale = STALE
