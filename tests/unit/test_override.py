@@ -114,6 +114,33 @@ def test_stale_obstacles_are_nothing_to_an_aircraft_that_is_not_flown():
     assert STALE not in output.reason
 
 
+# something new in the way of the plan, far ahead
+
+
+def told_of_a_wall(distance, grace):
+    """Fly east at 1 m/s; return the modes of each tick in 0.5 s, new plans not coming any more."""
+    check = dataclasses.replace(PARAMS.plan_check, grace=grace, timeout=5.0)
+    params = dataclasses.replace(PARAMS, plan_check=check)
+    flight = flight_with(following([1.0, 0.0, 0.0]), [1.0, 0.0, 0.0], params)
+    flight.run(0.5)
+    begun, x, flight.solver = flight.t, flight.aircraft.x[0], None
+    wall = Obstacle("wall", np.array([x + distance + 1.0, 0.0, 5.0]), np.array([1, 40, 40]), "box")
+    flight.obstacles = (wall,)
+    flight.run(0.5)
+    return [o.mode for o in since(flight, begun)]
+
+
+def test_a_plan_with_a_conflict_beyond_a_stop_is_flown_on_for_the_grace_only():
+    modes = told_of_a_wall(2.9, 0.3)
+    assert set(modes[:14]) == {Mode.FLYING}
+    assert modes[-1] is Mode.BRAKING
+
+
+def test_twin_without_grace_or_with_no_time_left_it_brakes_at_once():
+    assert told_of_a_wall(2.9, 0.0)[0] is Mode.BRAKING
+    assert told_of_a_wall(1.5, 0.3)[0] is Mode.BRAKING
+
+
 # no room to stop
 
 
