@@ -10,9 +10,11 @@ from nmpc_control.mode_inputs import STREAMING, Mode, Request
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.params import load_parameters
+from nmpc_control.reference_clock import ReferenceClock
 from nmpc_control.scenario import load_scenario
 from nmpc_control.state import Goal
 from nmpc_control.trajectory import line
+from uav_sim.closed_loop import loop
 from uav_sim.closed_loop.simulate import new_loop
 
 MARGIN = 0.5  # [m] hull to surface
@@ -137,6 +139,49 @@ def test_before_a_wall_it_stops_and_says_so_and_goes_on_when_it_is_gone():
     assert flight.loop.guard.mode is Mode.FLYING
     flight.know([])
     assert flight.until_over(15.0).arrived
+
+
+@TWINS
+def test_let_go_it_does_not_sprint_after_the_reference(protected, monkeypatch):
+    """The twin's reference stands ahead of it and is flown after at once."""
+    if not protected:
+        monkeypatch.setattr(ReferenceClock, "release", lambda clock, t: None)
+    pace = 1.5
+    flight = Flight()
+    flight.know(wall(6.0))
+    flight.begin(line(np.array([0.0, 0.0, 10.0]), np.array([25.0, 0.0, 10.0]), speed=pace))
+    flight.run(9.0)
+    assert flight.plan.status.count("held up by")
+    flight.know([])
+    before = len(flight.loop.log.truths)
+    flight.run(4.0)
+    along = max(truth.velocity[0] for truth in flight.loop.log.truths[before:])
+    assert flight.truth.velocity[0] > pace
+    assert (along < 1.35 * pace) == protected
+    assert protected or along > 2.0 * pace
+
+
+@TWINS
+def test_braked_for_long_without_leaving_the_mode_it_does_not_set_off_unasked(
+    protected, monkeypatch
+):
+    """The guard brakes for what it cannot see; the twin's controller is not told."""
+    if not protected:
+        monkeypatch.setattr(loop, "BRAKES", ())
+    flight = Flight(patience=5.0)
+    flight.begin(line(np.array([0.0, 0.0, 10.0]), np.array([30.0, 0.0, 10.0]), speed=1.5))
+    flight.run(2.0)
+    flight.loop.inbox.obstacles_stale = "nothing heard of the laser"
+    flight.run(3.0)
+    assert flight.loop.guard.mode is Mode.FLYING
+    assert flight.itinerary.goal is Goal.TRAJECTORY
+    flight.run(3.5)
+    given_up = flight.itinerary.outcome is not None
+    assert given_up == protected
+    assert not given_up or "held up" in flight.itinerary.outcome.message
+    flight.loop.inbox.obstacles_stale = ""
+    flight.run(2.0)
+    assert (np.linalg.norm(flight.truth.velocity) > 1.0) != protected
 
 
 def test_twin_that_knows_of_no_wall_flies_through_it():

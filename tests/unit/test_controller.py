@@ -57,6 +57,19 @@ def test_only_a_plan_that_was_found_and_is_flown_is_a_promise_to_others(controll
     assert not dataclasses.replace(step, plan=lost).is_promise
 
 
+def test_who_held_it_up_before_is_forgotten_where_nothing_can_be_solved(controller):
+    """Neither a missing state nor a problem that cannot be posed is held up by what was there."""
+    tell(controller, 0.0)
+    controller.nmpc.held_up_by = ("wall",)
+    nowhere = Obstacle("nowhere", np.full(3, np.nan), np.array([1.0]))
+    controller.obstacles = (nowhere,)
+    assert not controller.step(0.05).plan.found
+    assert controller.nmpc.held_up_by == ()
+    controller.nmpc.held_up_by = ("wall",)
+    assert controller.step(30.0) is None
+    assert controller.nmpc.held_up_by == ()
+
+
 def test_losing_engagement_ends_the_trajectory(controller):
     controller.engaged = True
     tell(controller, 0.0)

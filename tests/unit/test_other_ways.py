@@ -6,8 +6,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from nmpc_control.guides import Turns
 from nmpc_control.nmpc import Nmpc
 from nmpc_control.obstacle import Obstacle
+from nmpc_control.other_ways import OtherWays
 from nmpc_control.params import load_parameters
 from nmpc_control.state import hover_input, hover_state
 
@@ -80,26 +82,58 @@ def test_the_side_is_kept(nmpc):
     assert nmpc._other_ways.changes <= 3
 
 
-def test_what_does_not_stand_in_the_way_costs_nothing(nmpc):
+class Counting:
+    """A solver that counts its solves."""
+
+    def __init__(self, solver):
+        self.solver, self.solves = solver, 0
+
+    def solve(self, instance, guess=None):
+        self.solves += 1
+        return self.solver.solve(instance, guess)
+
+
+@pytest.fixture
+def counting(nmpc):
+    """Yield the counter of a controller's solver."""
+    nmpc.solver = Counting(nmpc.solver)
+    yield nmpc.solver
+    nmpc.solver = nmpc.solver.solver
+
+
+def test_what_does_not_stand_in_the_way_costs_nothing(nmpc, counting):
     beside = dataclasses.replace(BALL, position=np.array([5.0, 2.5, 5.0]))
-    fly(nmpc, 1, (beside,), 1)
-    solves = []
-    solver = nmpc.solver
+    fly(nmpc, 1, (beside,), 4)
+    assert counting.solves == 4
 
-    class Counting:
-        def solve(self, instance, guess=None):
-            solves.append(1)
-            return solver.solve(instance, guess)
 
-    nmpc.solver = Counting()
-    try:
-        fly(nmpc, 1, (beside,), 4)
-        assert len(solves) == 4
-        solves.clear()
-        fly(nmpc, 1, (BALL,), 4)
-        assert 4 + 3 < len(solves) <= 4 + 2 * (8 + 3), "all sides at first, then one now and then"
-    finally:
-        nmpc.solver = solver
+def test_a_tick_from_scratch_tries_few_sides_and_the_next_ones_the_others(nmpc, counting):
+    """Each try is two solves: of the way itself, and of the problem from there."""
+    tried = []
+    take = Turns.take
+
+    def noted(self, count):
+        tried.append(take(self, count))
+        return tried[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Turns, "take", noted)
+        fly(nmpc, 1, (BALL,), 1)
+        assert counting.solves <= 1 + 2 * 3
+        tried.clear()
+        fly(nmpc, 1, (BALL,), 6)
+        assert [len(sides) for sides in tried] == [3, 1, 1, 1, 1, 1]
+        assert sorted(sum(tried, [])) == list(range(8)), "all had their turn"
+        tried.clear()
+        fly(nmpc, 1, (BALL,), 12)
+        assert len(tried) == 6 + 2, "then one now and then"
+
+
+def test_ticks_that_find_nothing_try_all_sides_in_turn(nmpc):
+    nowhere = OtherWays(1, shooting=True)
+    tried = sum((nowhere._turns.take(nowhere._count(True)) for _ in range(3)), [])
+    assert set(tried) == set(range(8))
+    assert len(tried) == 9
 
 
 def test_a_dead_end_is_left_for_the_side_that_is_open(nmpc):

@@ -65,6 +65,19 @@ def test_it_catches_up_faster_than_its_own_pace_and_no_further():
     assert clock.time == pytest.approx(t - BEGIN, abs=0.05)
 
 
+def test_after_a_hold_up_it_starts_beside_the_aircraft_and_stays_there_until_that_is_under_way():
+    clock = ReferenceClock(WAY, BEGIN, FLIGHT)
+    t = run(clock, BEGIN, 15.0, lambda _: at(WAY, 5.0))
+    assert clock.time > 6.5
+    clock.release(t)
+    t = run(clock, t, 1.5, lambda _: at(WAY, 5.0))
+    assert clock.time == pytest.approx(5.1, abs=0.1)
+    t = run(clock, t, 2.0, lambda _: at(WAY, clock.time))
+    assert clock.rate == 1.0 + FLIGHT.catch_up
+    t = run(clock, t, 1.0 + FLIGHT.wait_lag, lambda _: at(WAY, 5.0))
+    assert clock.time > 6.0, "later it waits as ever"
+
+
 def test_what_lies_ahead_is_read_at_full_pace_also_while_it_waits():
     clock = ReferenceClock(WAY, BEGIN, FLIGHT)
     t = run(clock, BEGIN, 20.0, lambda _: START)

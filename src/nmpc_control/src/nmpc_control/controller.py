@@ -67,6 +67,7 @@ class Controller:
         self.obstacles: Sequence[Obstacle] = ()
         self.engaged = False  # the guard flies these plans
         self.braking = False  # it does not, but brakes and will again
+        self.held_back = False  # it brakes for now without leaving the mode that flies them
         self.manual = False  # the pilot flies, or has just given back
         self._inputs: Deque[Tuple[float, np.ndarray]] = deque()
         self._unknown = -np.inf  # [s] when an input was sent last that the model does not have
@@ -107,7 +108,8 @@ class Controller:
         else:
             self.itinerary.forget_in_time(t)
             self.itinerary.resume(t)
-        self.itinerary.update(t, x[POSITION], x[VELOCITY], bool(self.nmpc.held_up_by))
+        held_up = bool(self.nmpc.held_up_by) or self.held_back
+        self.itinerary.update(t, x[POSITION], x[VELOCITY], held_up)
 
         vehicle = self._learn(t, x)
         x0 = predict(x, t, t + vehicle.delay, self._inputs, vehicle)

@@ -7,11 +7,10 @@ from typing import Optional, Tuple
 import numpy as np
 
 from nmpc_control.params import Flight
+from nmpc_control.patience import Patience
 from nmpc_control.reference_clock import ReferenceClock
 from nmpc_control.state import NX, POSITION, VELOCITY, YAW, YAW_RATE, Goal
 from nmpc_control.trajectory import Trajectory, approach
-
-_FREE = 3.0  # [s] of going on after which patience begins anew
 
 
 @dataclass(frozen=True)
@@ -40,8 +39,7 @@ class Itinerary:
         self._suspended: Optional[Goal] = None
         self._left: Optional[float] = None  # [s] of the trajectory, where it goes on after a leg
         self._waits_since: Optional[float] = None  # [s] for somebody to ask for it, since when
-        self._held_since: Optional[float] = None
-        self._held_last = 0.0  # [s]
+        self._patience: Optional[Patience] = None  # with the goal
         self._settled_since: Optional[float] = None
 
     @property
@@ -118,7 +116,7 @@ class Itinerary:
         self._left = self._waits_since = None
         self._clock = ReferenceClock(trajectory, t - at, self.flight)
         self._clock.go_on(t, at)
-        self._held_since = None
+        self._patience = Patience(self.flight, t)
 
     def is_going_to(self, target: np.ndarray) -> bool:
         """Return whether a target (3,) [m] is what ``go_to`` is under way to."""
@@ -134,12 +132,16 @@ class Itinerary:
             t: [s] now.
             position: (3,) [m] of the aircraft.
             velocity: (3,) [m/s] of it.
-            held_up: whether obstacles keep it from going on; then time does not press.
+            held_up: whether obstacles or the guard keep it from going on; then time does not press.
         """
-        if not self.is_pursuing:
+        if not self.is_pursuing or self.waits:
             return
-        if self._is_out_of_patience(t, held_up or (self._suspended is not None and not self.waits)):
-            self._give_up(t, position, f"held up for {self.flight.patience:g} s")
+        is_held, over = held_up or self._suspended is not None, min(0.0, self._clock.over)
+        if self._patience.update(t, is_held, over + self._clock.duration):
+            self._clock.release(t)
+        ended = self._patience.ended(t)
+        if ended:
+            self._give_up(t, position, ended)
         if self.goal is Goal.HOLD:
             return
         self._clock.advance(t, position)
@@ -148,11 +150,11 @@ class Itinerary:
         if self._left is not None:  # the trajectory goes on in motion: the place is enough
             at_rest = np.linalg.norm(position - self._target()) < self.flight.wait_lag
         if self.goal is Goal.APPROACH:
-            self._update_approach(t, position, bool(at_rest), held_up)
+            self._update_approach(t, position, bool(at_rest))
         elif self._clock.over >= 0.0:
             if at_rest:
                 self._finish("arrived")
-            elif self._clock.over > self.flight.arrival_timeout and not held_up:
+            elif self._patience.late(t, self._clock.over):
                 self._give_up(t, position, "the trajectory's time is over, its end was not reached")
 
     def reference(self, times: np.ndarray) -> np.ndarray:
@@ -188,7 +190,8 @@ class Itinerary:
         self, t: float, position: np.ndarray, yaw: float, target: np.ndarray, target_yaw: float
     ) -> None:
         self.goal, self.outcome, self._suspended = Goal.APPROACH, None, None
-        self.clock_start, self._settled_since, self._held_since = None, None, None
+        self.clock_start, self._settled_since = None, None
+        self._patience = Patience(self.flight, t)
         self._left = self._waits_since = None
         self._leg = approach(
             position,
@@ -203,12 +206,10 @@ class Itinerary:
     def _target(self) -> np.ndarray:
         return self._path.end
 
-    def _update_approach(
-        self, t: float, position: np.ndarray, at_rest: bool, held_up: bool
-    ) -> None:
+    def _update_approach(self, t: float, position: np.ndarray, at_rest: bool) -> None:
         if not at_rest or self._clock.over < 0.0:
             self._settled_since = None
-            if self._clock.over > self.flight.arrival_timeout and not held_up:
+            if self._patience.late(t, self._clock.over):
                 self._give_up(t, position, "the start was not reached in time")
             return
         self._settled_since = t if self._settled_since is None else self._settled_since
@@ -218,20 +219,6 @@ class Itinerary:
             self._finish("arrived")
         else:
             self.begin(t, self.trajectory, self._left or 0.0)
-
-    def _is_out_of_patience(self, t: float, is_held: bool) -> bool:
-        """Return whether it has been held up, by obstacles or the guard, for too long.
-
-        Where the guard brakes for what the solver does not see, the two take turns for ever: a
-        moment of going on is no progress.
-        """
-        if not is_held:
-            if t - self._held_last > _FREE:
-                self._held_since = None
-            return False
-        self._held_since = t if self._held_since is None else self._held_since
-        self._held_last = t
-        return t - self._held_since > self.flight.patience
 
     def _finish(self, message: str) -> None:
         last = self._path.sample(np.array([self._path.duration]))
@@ -246,5 +233,5 @@ class Itinerary:
 
     def _end(self, arrived: bool, message: str) -> None:
         self.goal, self.outcome = Goal.HOLD, Outcome(arrived, message)
-        self._leg, self._clock, self.clock_start, self._held_since = None, None, None, None
+        self._leg, self._clock, self.clock_start, self._patience = None, None, None, None
         self._suspended = self._left = self._waits_since = None

@@ -70,7 +70,7 @@ class Nmpc:
 
     def reset(self) -> None:
         """Forget the last solution: the next solve starts from hover."""
-        self._last = None
+        self._last, self.held_up_by = None, ()
 
     def stage_times(self, t: float) -> np.ndarray:
         """Return when (N + 1,) [s] the telemetry shows the stages of a plan made for ``t``."""
@@ -99,6 +99,7 @@ class Nmpc:
         Raises:
             ProblemError: a wrong shape; a time, reference or obstacle that is not finite.
         """
+        self.held_up_by = ()
         check_arguments(t, x0, x_ref, u_before, u_ref, self.structure.horizon)
         start = time.perf_counter()
         problem = self._pose(t, x0, x_ref, u_before, obstacles, u_ref)
@@ -108,7 +109,6 @@ class Nmpc:
         if guess is not None and guess.multipliers is not None:
             guess.multipliers[:, [constraints.PILOT_BOUNDS + i for i in self._slots.renewed]] = 0.0
         solution = self.solver.solve(instance, guess)
-        self.held_up_by = ()
         if problem.obstacles:
             choice = self._other_ways.improve(
                 self.solver, problem, solution, self._slots, warm=guess is not None

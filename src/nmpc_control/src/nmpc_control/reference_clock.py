@@ -9,6 +9,8 @@ from nmpc_control.trajectory import Trajectory
 _LOOK_BACK = 4.0  # [s] along the reference where the aircraft is looked for
 _SAMPLES = 41
 _LEAST_LAG = 0.5  # [m] of lag never makes a clock wait
+_LEAD = 0.1  # [s] ahead of an aircraft that was held up
+_SETS_OFF = 2.0  # [s] in which it gathers speed
 
 
 class ReferenceClock:
@@ -27,11 +29,17 @@ class ReferenceClock:
         self.rate = 1.0  # [1]
         self._trajectory, self._flight = trajectory, flight
         self._t = t
+        self._near_until = -np.inf  # [s]
 
     @property
     def waits(self) -> bool:
         """Whether it stands."""
         return self.rate < 0.05
+
+    @property
+    def duration(self) -> float:
+        """Time [s] that the trajectory takes."""
+        return self._trajectory.duration
 
     @property
     def over(self) -> float:
@@ -46,6 +54,13 @@ class ReferenceClock:
         """Read ``time`` [s] at ``t`` [s] and run from there."""
         self._t, self.time = t, time
 
+    def release(self, t: float) -> None:
+        """Stay near the aircraft from ``t`` [s] on until it has gathered speed.
+
+        It was held up and is let go: what is late is caught up by ``catch_up``, not by a sprint.
+        """
+        self._near_until = t + _SETS_OFF
+
     def read(self, times: np.ndarray) -> np.ndarray:
         """Return the trajectory's times [s] at times (M,) [s]."""
         return self.time + max(1.0, self.rate) * (times - self._t)
@@ -54,9 +69,13 @@ class ReferenceClock:
         """Move on to time ``t`` [s] with the aircraft at a position (3,) [m]."""
         self.time += self.rate * max(0.0, t - self._t)
         self._t = t
-        lag = self._lag(position)
+        near = t < self._near_until
+        lag = self._lag(position, 0.0 if near else _LEAST_LAG)
         wait = self._flight.wait_lag
-        if self.over >= 0.0:
+        if near:
+            self.time = min(self.time, self.duration) - max(0.0, lag - _LEAD)
+            self.rate = 1.0
+        elif self.over >= 0.0:
             self.rate = 1.0
         elif lag > wait:
             self.rate = max(0.0, 2.0 - lag / wait)
@@ -65,8 +84,11 @@ class ReferenceClock:
         else:
             self.rate = 1.0
 
-    def _lag(self, position: np.ndarray) -> float:
-        """Return how long ago [s] the reference was where the aircraft is nearest to it."""
+    def _lag(self, position: np.ndarray, least: float) -> float:
+        """Return how long ago [s] the reference was where the aircraft is nearest to it.
+
+        None, where that is no longer a way than ``least`` [m].
+        """
         if not self._trajectory.timing.continuous:
             return 0.0
         now = min(self.time, self._trajectory.duration)
@@ -75,4 +97,4 @@ class ReferenceClock:
         away = np.linalg.norm(points - position, axis=1)
         nearest = int(np.argmin(away))
         way = float(np.linalg.norm(np.diff(points[: nearest + 1], axis=0), axis=1).sum())
-        return float(ago[nearest]) if way > _LEAST_LAG else 0.0
+        return float(ago[nearest]) if way > least else 0.0

@@ -35,6 +35,7 @@ from std_msgs.msg import Empty, String
 
 from nmpc_control.controller import Controller
 from nmpc_control.errors import ConfigError, NmpcError
+from nmpc_control.ladder import BRAKES
 from nmpc_control.mode_inputs import FOLLOWED, PLANNED
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters, load_parameters, load_weights
@@ -240,6 +241,7 @@ class ControllerNode:
         def on_status(m: ControllerStatus) -> None:
             self.controller.engaged = m.mode in PLANNED
             self.controller.braking = m.mode == ControllerStatus.MODE_BRAKING
+            self.controller.held_back = m.mode in PLANNED and m.rung in BRAKES
             self.controller.manual = m.mode in FOLLOWED
             u = (m.applied.thrust, m.applied.roll, m.applied.pitch, m.applied.yaw_rate)
             known = m.setpoint_sent and np.all(np.isfinite(u))

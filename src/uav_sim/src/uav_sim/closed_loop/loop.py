@@ -11,6 +11,7 @@ from nmpc_control.guard import Guard
 from nmpc_control.guard_data import Action, GuardOutput
 from nmpc_control.guard_inbox import GuardInbox
 from nmpc_control.guard_params import GuardParameters
+from nmpc_control.ladder import BRAKES
 from nmpc_control.mode_inputs import FOLLOWED, PLANNED, STREAMING, Mode, Request
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters
@@ -153,6 +154,7 @@ class ClosedLoop:
         self.controller.record_input(self.t, np.array(output.applied) if known else None)
         self.controller.engaged = output.mode in PLANNED
         self.controller.braking = output.mode is Mode.BRAKING
+        self.controller.held_back = output.mode in PLANNED and output.rung in BRAKES
         self.controller.manual = output.mode in FOLLOWED
         self.log.outputs.append((self.t, output))
 
