@@ -15,6 +15,7 @@ from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_field import FieldOf, ObstacleField
 from nmpc_control.ocp import EMPTY_SLOT, SLOT_SIZE
 
+_EXPECTED = 0.75  # of the slots are for what is near the expected path
 _LATER = 0.3  # [m/s] a conflict this much later weighs as much as a metre more of clearance
 
 
@@ -67,8 +68,8 @@ class Slots:
             return data
         distances = [self.field.distances(path, times) for path in paths]
         later = _LATER * (times - times[0])
-        conflict = np.min([(d + later).min(axis=1) for d in distances], axis=0)
-        order = np.argsort(conflict, kind="stable")
+        conflicts = np.array([(d + later).min(axis=1) for d in distances])
+        order = _order(conflicts, int(_EXPECTED * len(self.occupants)))
         chosen, rest = order[: len(self.occupants)], order[len(self.occupants) :]
         nearest = np.min([d[rest].min(axis=1) for d in distances], axis=0)
         self.left_out = int(np.sum(nearest < margin + reach))
@@ -99,6 +100,17 @@ class Slots:
                 seated[slot] = name
                 self.renewed.append(slot)
         self.occupants = seated
+
+
+def _order(conflicts: np.ndarray, first: int) -> np.ndarray:
+    """Return obstacles (n,) in the order of choice, given their conflicts (paths, n) [m].
+
+    The first ones for the expected path: behind a wall of many, those on the reference would take
+    all slots, and nothing would keep the way round from cutting the corner.
+    """
+    expected = np.argsort(conflicts[0], kind="stable")[:first]
+    others = np.argsort(conflicts.min(axis=0), kind="stable")
+    return np.concatenate([expected, others[~np.isin(others, expected)]])
 
 
 def _half_ways(path: np.ndarray, centres: np.ndarray) -> np.ndarray:
