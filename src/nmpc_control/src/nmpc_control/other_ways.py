@@ -82,7 +82,7 @@ class OtherWays:
         self.changes = 0
         self._turns = Turns()
         self._ticks = 0
-        self._owed = 0  # sides of a round that began at once which had no turn yet
+        self._owed = 0  # sides of a round that had no turn yet
         self._shooting = shooting
 
     def improve(
@@ -104,11 +104,14 @@ class OtherWays:
         self._ticks += 1
         at_once = not warm or not solution.found  # else a try now and then is enough
         due = self._tries and (at_once or self._owed or self._ticks % _PAUSE == 0)
-        if not (due and best.blocked.any()):
+        if not best.blocked.any():
+            self._owed = 0
+            return best
+        if not due:
             return best
         across = sides(reference[-1] - reference[0])
         slope = _SIDEWAYS * problem.structure.dt
-        for index in self._turns.take(self._count(at_once)):
+        for index in self._due(at_once):
             way = way_round(spheres, problem.margin, reference, across[index], slope)
             if way is None:
                 continue
@@ -120,13 +123,15 @@ class OtherWays:
                 self.changes += 1
         return best
 
-    def _count(self, at_once: bool) -> int:
-        """Return how many sides to try in this tick; a count, for a clock is never the same."""
+    def _due(self, at_once: bool) -> List[int]:
+        """Return which sides to try in this tick: a count, for a clock is never the same."""
         if not self._shooting:
-            return self._tries
+            return self._turns.take(self._tries)
+        if at_once and not self._owed:
+            self._turns, self._owed = Turns(), SIDES  # a round begins with the right
         count = max(_AT_ONCE, self._tries) if at_once else self._tries
-        self._owed = max(0, (SIDES if at_once else self._owed) - count)
-        return count
+        self._owed = max(0, self._owed - count)
+        return self._turns.take(count)
 
     def _guess(self, solver: Solver, problem: Posed, way: np.ndarray) -> Guess:
         follow = problem.free(way)
