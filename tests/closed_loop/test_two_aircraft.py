@@ -2,6 +2,7 @@
 """Two aircraft that exchange predictions change places, and meet without them."""
 
 import numpy as np
+import pytest
 
 from nmpc_control.mode_inputs import Request
 from nmpc_control.obstacle_memory import ObstacleMemory
@@ -17,18 +18,19 @@ from uav_sim.world import World
 
 PARAMETERS = load_parameters("dji_hil", "outdoor")
 HULL = PARAMETERS.vehicle.radius
-LATER = 2.0  # [s] after the first the second sets out
+LATER = (0.0, 2.0)  # [s] after the first the second sets out
 ENDS = (np.array([-5.0, 0.0, 4.0]), np.array([5.0, 0.0, 4.0]))
 
 
 class Aircraft:
     """One of two, with what it is told of the other."""
 
-    def __init__(self, start, target):
+    def __init__(self, start, target, **changes):
         self.loop = new_loop(load_scenario("hover"), PARAMETERS, "dji_hil", World((), HULL))
         self.loop.aircraft.place(start)
         self.target = target
-        self.traffic = Traffic(TrafficParameters(radius=HULL, growth=0.1, forget_after=30.0))
+        known = TrafficParameters(radius=HULL, growth=0.1, **changes)
+        self.traffic = Traffic(known)
         self.memory = ObstacleMemory(load_obstacle_parameters())
 
     @property
@@ -51,7 +53,7 @@ class Aircraft:
             plan.dt,
         )
         self.traffic.predict("other", course)
-        (o,), _ = self.traffic.report(t)
+        (o,) = self.traffic.report()
         numbers = [tuple(map(float, a)) for a in (o.size, o.position, o.velocity, o.path.ravel())]
         sighting = Sighting(o.id, o.shape, *numbers, o.path_dt, o.growth, o.stamp)
         self.memory.hear(t, "/nmpc_traffic", [(sighting, "")])
@@ -60,9 +62,9 @@ class Aircraft:
         inbox.obstacles_stale = self.memory.stale(t)
 
 
-def change_places(exchange, seconds=9.0):
+def change_places(exchange, later, seconds=9.0, **changes):
     """Return the least distance [m] of the centres and the last positions."""
-    two = Aircraft(*ENDS), Aircraft(*ENDS[::-1])
+    two = Aircraft(*ENDS, **changes), Aircraft(*ENDS[::-1], **changes)
     hovering = [False, False]
     steps_a_look = round(OBSTACLE_PERIOD / two[0].loop.aircraft.preset.step)
     least, count, since, second_is_out = np.inf, 0, None, False
@@ -76,7 +78,7 @@ def change_places(exchange, seconds=9.0):
         if all(hovering) and since is None:
             since = two[0].loop.t
             two[0].set_out()
-        if since is not None and not second_is_out and two[0].loop.t > since + LATER:
+        if since is not None and not second_is_out and two[0].loop.t > since + later:
             second_is_out = True
             two[1].set_out()
         if exchange and count % steps_a_look == 0 and all(one.loop.log.steps for one in two):
@@ -87,14 +89,22 @@ def change_places(exchange, seconds=9.0):
     return least, two
 
 
-def test_two_that_know_of_each_other_pass():
-    least, two = change_places(exchange=True)
+@pytest.mark.parametrize("later", LATER)
+def test_two_that_know_of_each_other_pass(later):
+    least, two = change_places(True, later)
     assert least > 2 * HULL + 0.25
     for one in two:
         assert np.linalg.norm(one.position - one.target) < 0.5
         assert not one.memory.rejected
+        assert "BRAKING" not in {o.mode.name for t, o in one.loop.log.outputs if t > 2.0}
 
 
-def test_two_that_do_not_meet():
-    least, _ = change_places(exchange=False, seconds=5.5)
+@pytest.mark.parametrize("later", LATER)
+def test_twin_two_that_do_not_meet(later):
+    least, _ = change_places(False, later, seconds=5.5)
     assert least < 2 * HULL
+
+
+def test_twin_two_that_answer_every_path_at_once_hold_each_other_up():
+    _, two = change_places(True, 0.0, settling=0.0)
+    assert min(np.linalg.norm(one.position - one.target) for one in two) > 2.0

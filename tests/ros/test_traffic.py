@@ -19,6 +19,7 @@ def test_predictions_and_odometry_of_others_become_obstacles(ros):
     assert 0.0 <= age < 0.5
     assert seen["dji3"] == pytest.approx([10.0, 1.0, -2.0, 0.0], abs=1e-6)
     assert seen["silent"] == [5.0, "dji2", 2]
+    assert seen["left"] == ["dji3"], "the silent one is forgotten when an operator says so"
 
 
 @pytest.mark.parametrize("others", ["", " , ", "/dji2,dji2", "/dji2,/dji1"])

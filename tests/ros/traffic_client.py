@@ -18,7 +18,7 @@ from geometry_msgs.msg import (
     Vector3,
 )
 from nav_msgs.msg import Odometry
-from std_msgs.msg import Header
+from std_msgs.msg import Header, String
 
 from nmpc_msgs.msg import ObstacleArray, Prediction
 
@@ -77,6 +77,12 @@ def main():
     }
     late = tell(lambda m: age(m) > 1.0, (second, odometry))
     seen["silent"] = [late.obstacles[0].position.x, late.obstacles[0].id, len(late.obstacles)]
+    forget = rospy.Publisher("/dji1/nmpc/forget_obstacles", String, queue_size=1)
+    tell(lambda m: forget.get_num_connections(), (second, odometry))
+    forget.publish("/dji1/nmpc_traffic")
+    left = tell(lambda m: len(m.obstacles) < 2, (second, odometry))
+    left = left if left.obstacles else tell(lambda m: m.obstacles, (second, odometry))
+    seen["left"] = [o.id for o in left.obstacles]
     sys.stdout.write(json.dumps(seen) + "\n")
 
 

@@ -46,6 +46,17 @@ def test_not_engaged_it_follows_and_engaged_it_holds(controller):
     assert controller.step(0.2).reference[POSITION] == pytest.approx([2.0, 0.0, 5.0])
 
 
+def test_only_a_plan_that_was_found_and_is_flown_is_a_promise_to_others(controller):
+    tell(controller, 0.0)
+    assert not controller.step(0.0).is_promise, "a pilot flies, whatever the plan says"
+    controller.engaged = True
+    tell(controller, 0.1)
+    step = controller.step(0.1)
+    assert step.is_promise
+    lost = dataclasses.replace(step.plan, found=False)
+    assert not dataclasses.replace(step, plan=lost).is_promise
+
+
 def test_who_held_it_up_before_is_forgotten_where_nothing_can_be_solved(controller):
     """Neither a missing state nor a problem that cannot be posed is held up by what was there."""
     tell(controller, 0.0)

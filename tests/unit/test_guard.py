@@ -239,7 +239,7 @@ def test_an_obstacle_that_pops_up_stops_the_last_plan_at_once():
     assert flight.run(0.3).mode is Mode.FLYING
     flight.solver = None
     x = flight.aircraft.x[0]
-    flight.obstacles = (Obstacle("popup", np.array([x + 3.0, 0.0, 5.0]), np.array([0.5])),)
+    flight.obstacles = (Obstacle("popup", np.array([x + 2.4, 0.0, 5.0]), np.array([0.5])),)
     output = flight.tick()
     assert output.mode is Mode.BRAKING
     assert "popup" in output.reason

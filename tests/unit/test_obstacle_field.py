@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Obstacles as arrays agree with each one alone, and their spheres touch the true surfaces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from nmpc_control.obstacle import MAX_GROWTH, Obstacle
+from nmpc_control.obstacle import MAX_GROWTH, MIN_PATH_DT, Obstacle
 from nmpc_control.obstacle_field import ObstacleField
+from nmpc_control.obstacle_sighting import Sighting, fault
 
 TIMES = np.linspace(0.5, 6.0, 23)
 
@@ -73,6 +76,20 @@ def test_what_is_nowhere_is_named():
     flat = Obstacle("flat", np.zeros(3), np.array([1.0, 0.0, 1.0]), "box")
     assert ObstacleField([*some(), lost, flat]).unusable == ("lost", "flat")
     assert ObstacleField(some()).unusable == ()
+
+
+@pytest.mark.parametrize("path_dt", [1e-300, 1e-20, 0.9 * MIN_PATH_DT])
+def test_a_path_of_hardly_any_spacing_is_unusable_and_breaks_nothing(path_dt):
+    guest = replace(some()[-1], path=np.zeros((3, 3)), path_dt=path_dt)
+    field = ObstacleField([guest, replace(guest, id="twin", path_dt=MIN_PATH_DT)])
+    assert field.unusable == ("guest",)
+    np.testing.assert_array_equal(field.centres(TIMES), np.zeros((2, len(TIMES), 3)))
+
+
+def test_the_closest_points_of_a_path_that_are_believed():
+    path = Sighting("bird", "sphere", (0.3,), (5.0, 0.0, 2.0), path=(5.0, 0.0, 2.0), path_dt=1e-3)
+    assert fault(path) == ""
+    assert fault(path._replace(path_dt=0.9e-3)) == "path"
 
 
 def test_no_obstacle_is_no_row():

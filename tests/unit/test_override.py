@@ -82,12 +82,63 @@ def test_what_stale_obstacles_have_grown_to_does_not_end_the_mode():
     assert output.mode is Mode.BRAKING
 
 
+def met_by_one_whose_sender_is_silent(params):
+    """Hover, with plans that step aside, while a ball comes that was seen last 2 s ago."""
+    step_aside = steered(lambda x, vehicle: [-x[6], 3.0 * (2.0 - x[7]), -x[8]])
+    flight = flight_with(step_aside, params=params)
+    flight.stale, begun = STALE, flight.t
+    ball = sphere([4.5, -0.1, 5.0], 0.5, velocity=np.array([-1.5, 0.0, 0.0]), stamp=flight.t)
+    flight.obstacles = (ball,)
+    flight.run(4.0)
+    return flight, least(flight, ball, begun)
+
+
+def test_what_comes_is_evaded_although_its_sender_is_silent_and_then_it_holds():
+    flight, clearance = met_by_one_whose_sender_is_silent(PARAMS)
+    assert clearance > 0.2
+    output = flight.log[-1][2]
+    assert (output.rung, output.reason) == (Rung.BRAKE, STALE), "it has passed"
+    assert flight.speed < 0.3
+
+
+def test_twin_that_always_brakes_for_what_is_stale_is_met():
+    _, clearance = met_by_one_whose_sender_is_silent(without(advantage=1e3))
+    assert clearance < 0.0
+
+
 def test_stale_obstacles_are_nothing_to_an_aircraft_that_is_not_flown():
     flight = Flight()
     flight.stale = STALE
     output = flight.run(1.0)
     assert (output.mode, output.axes) == (Mode.READY, None)
     assert STALE not in output.reason
+
+
+# something new in the way of the plan, far ahead
+
+
+def told_of_a_wall(distance, grace):
+    """Fly east at 1 m/s; return the modes of each tick in 0.5 s, new plans not coming any more."""
+    check = dataclasses.replace(PARAMS.plan_check, grace=grace, timeout=5.0)
+    params = dataclasses.replace(PARAMS, plan_check=check)
+    flight = flight_with(following([1.0, 0.0, 0.0]), [1.0, 0.0, 0.0], params)
+    flight.run(0.5)
+    begun, x, flight.solver = flight.t, flight.aircraft.x[0], None
+    wall = Obstacle("wall", np.array([x + distance + 1.0, 0.0, 5.0]), np.array([1, 40, 40]), "box")
+    flight.obstacles = (wall,)
+    flight.run(0.5)
+    return [o.mode for o in since(flight, begun)]
+
+
+def test_a_plan_with_a_conflict_beyond_a_stop_is_flown_on_for_the_grace_only():
+    modes = told_of_a_wall(2.9, 0.3)
+    assert set(modes[:14]) == {Mode.FLYING}
+    assert modes[-1] is Mode.BRAKING
+
+
+def test_twin_without_grace_or_with_no_time_left_it_brakes_at_once():
+    assert told_of_a_wall(2.9, 0.0)[0] is Mode.BRAKING
+    assert told_of_a_wall(1.5, 0.3)[0] is Mode.BRAKING
 
 
 # no room to stop

@@ -190,6 +190,7 @@ def _judged(
     if len(way.ids):
         k = int(way.grown[:, : ahead.shape[1]].min(axis=0).argmin())
         speed = float(np.linalg.norm(plan.state_at(way.times[k])[VELOCITY]))
+    too_near = (ahead - way.growth[:, None] < params.minimum_clearance).any(axis=0)
     verdict = Verdict(
         Finding.OK,
         _said(plan),
@@ -198,6 +199,7 @@ def _judged(
         nearest=float((nearest - way.growth).min(initial=math.inf)),
         speed=speed,
         inside=inside,
+        conflict=float(way.times[too_near.argmax()]) if too_near.any() else math.inf,
     )
     for i, (name, growth) in enumerate(zip(way.ids, way.growth)):
         floor = before.clearance.get(name, now[i]) - params.growth_tolerance

@@ -15,7 +15,7 @@ import numpy as np
 
 SPEED, FENCE, OBSTACLE = "speed", "fence", "obstacle"
 # curvature of the augmented Lagrangian per row: about a hundred times that of the tracking cost
-_CURVATURE = {SPEED: 500.0, FENCE: 2000.0, OBSTACLE: 2000.0}
+_CURVATURE = {SPEED: 500.0, FENCE: 2000.0, OBSTACLE: 20000.0}
 
 
 PILOT_BOUNDS = 7  # rows of speed and fence, before those of the obstacles

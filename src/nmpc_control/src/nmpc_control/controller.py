@@ -40,11 +40,17 @@ class Step:
     reference_time: float  # [s] clock of the trajectory at stage 0; NaN while none is flown
     clearance: float  # [m] hull to the nearest obstacle's surface, now; inf without obstacles
     predicted_clearance: float  # [m] the same, least over the plan
+    engaged: bool  # whether the guard flew the controller's plans when the step began
 
     @property
     def deviation(self) -> float:
         """Distance [m] of the estimate from the reference at the same time."""
         return float(np.linalg.norm(self.estimate.vector[POSITION] - self.reference[POSITION]))
+
+    @property
+    def is_promise(self) -> bool:
+        """Whether others may count on the plan: a pilot's aircraft goes where the pilot wants."""
+        return self.engaged and self.plan.found
 
 
 class Controller:
@@ -96,8 +102,8 @@ class Controller:
         if estimate is None or estimate.age > self.parameters.flight.state_timeout:
             self.nmpc.reset()
             return None
-        x = estimate.vector
-        if not self.engaged:
+        x, engaged = estimate.vector, self.engaged
+        if not engaged:
             self._stand_by(t, x)
         else:
             self.itinerary.forget_in_time(t)
@@ -119,6 +125,7 @@ class Controller:
             reference_time=self.itinerary.reference_time(times[0]),
             clearance=self._clearance(x[None, POSITION], np.array([t])),
             predicted_clearance=self._clearance(plan.states[:, POSITION], times),
+            engaged=engaged,
         )
 
     def take_up(self, t: float) -> Tuple[bool, str]:

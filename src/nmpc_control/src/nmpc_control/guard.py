@@ -71,8 +71,11 @@ class Guard:
             state, when = self._state_in_effect(i), i.t + self.vehicle.delay
             return self.override.brake_clearance(state, when, obstacles)
 
+        def time_to_stop() -> float:
+            return self.override.time_to_stop(self._state_in_effect(i))
+
         self._take_plan(i, obstacles, brake_clearance)
-        rung, verdict = self.ladder.assess(i.t, obstacles, brake_clearance)
+        rung, verdict = self.ladder.assess(i.t, obstacles, brake_clearance, time_to_stop)
         self.situation.follow(i, dt, self.mode, self._axes, self._sent)
         seen = self.situation.see(i, self.mode, rung, verdict, self.ladder)
         answer = modes.answer(self.mode, seen, self.params.modes) if seen.request else None

@@ -16,6 +16,7 @@ from nmpc_control.verdict import NOT_INSIDE, Finding, PlanCheckParameters, Verdi
 
 # [m] a plan that is too near must keep this much farther off than the brake to be flown instead
 ADVANTAGE = 0.1
+SPARE = 0.3  # [s] beyond the time to stop that a conflict must be ahead for a plan to be flown on
 
 
 class Rung(IntEnum):
@@ -66,6 +67,7 @@ class PlanLadder:
         self._came = -math.inf  # [s] the newest plan, verified or not
         self._evades = False  # on a plan that is too near, because braking is worse
         self._is_new = False
+        self._too_near_since: Optional[float] = None
         self._usable_since: Optional[float] = None
         self._hold_since: Optional[float] = None
 
@@ -143,12 +145,13 @@ class PlanLadder:
         t: float,
         obstacles: Obstacles,
         brake_clearance: Callable[[], float] = lambda: math.inf,
+        time_to_stop: Callable[[], float] = lambda: math.inf,
     ) -> Tuple[Rung, Verdict]:
         """Return the rung at ``t`` [s], NONE without a usable plan, and the verdict behind it.
 
-        Arguments as of ``take``.
+        Arguments as of ``take``, and how long [s] a stop takes that is begun now.
         """
-        rung, verdict = self._assess(t, obstacles, brake_clearance)
+        rung, verdict = self._assess(t, obstacles, brake_clearance, time_to_stop)
         if rung is Rung.NONE:
             self._usable_since = None
         elif self._usable_since is None:
@@ -169,7 +172,11 @@ class PlanLadder:
         return math.inf if self.plan is None else t - self.plan.t
 
     def _assess(
-        self, t: float, obstacles: Obstacles, brake_clearance: Callable[[], float]
+        self,
+        t: float,
+        obstacles: Obstacles,
+        brake_clearance: Callable[[], float],
+        time_to_stop: Callable[[], float],
     ) -> Tuple[Rung, Verdict]:
         if self.plan is None:
             return Rung.NONE, self._verdict
@@ -186,6 +193,7 @@ class PlanLadder:
                 before=self._inside,
             )
             verdict = self._lesser_evil(verdict, brake_clearance)
+        verdict = self._flown_on(t, verdict, time_to_stop)
         if not verdict.ok:
             self.verified = 0
             return Rung.NONE, self._with_rejection(verdict)
@@ -200,6 +208,24 @@ class PlanLadder:
             return verdict
         sentence = f"{self._verdict.sentence}, and {verdict.sentence}"
         return replace(verdict, finding=self._verdict.finding, sentence=sentence)
+
+    def _flown_on(self, t: float, verdict: Verdict, time_to_stop: Callable[[], float]) -> Verdict:
+        """Return the verdict on a plan that is too near only beyond where a stop would end.
+
+        Something has come to be known that it did not, as another aircraft's new plan; the next
+        one answers it, and to brake before there is need would end the mode and hold up the goal.
+        """
+        if verdict.ok:
+            self._too_near_since = None
+            return verdict
+        if self._too_near_since is None:
+            self._too_near_since = t
+        left = verdict.conflict - t
+        is_awaited = t - self._too_near_since < self.params.grace
+        if not verdict.is_near or not is_awaited or not left > time_to_stop() + SPARE:
+            return verdict
+        sentence = f"{verdict.sentence} in {left:.1f} s, another plan is awaited"
+        return replace(verdict, finding=Finding.OK, sentence=sentence)
 
     def _lesser_evil(self, verdict: Verdict, brake_clearance: Callable[[], float]) -> Verdict:
         """Return the verdict on a plan that is too near, seeing what braking would do instead."""

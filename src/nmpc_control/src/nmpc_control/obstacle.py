@@ -6,6 +6,7 @@ from typing import Optional
 
 import numpy as np
 
+MIN_PATH_DT = 1e-3  # [s] closer points say nothing more
 MAX_GROWTH = 3.0  # [m] an obstacle's radius never grows by more than this
 
 
@@ -20,7 +21,7 @@ class Obstacle:
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) [m/s]
     stamp: Optional[float] = None  # [s] time of the position; None: it stands still for ever
     path: Optional[np.ndarray] = None  # (M, 3) [m] centre at stamp + (i + 1) * path_dt
-    path_dt: float = 0.0  # [s] spacing of the path
+    path_dt: float = 0.0  # [s] spacing of the path, at least MIN_PATH_DT
     growth: float = 0.0  # [m/s] of the radius with the age of the information
 
     def position_at(self, t: np.ndarray) -> np.ndarray:
@@ -37,7 +38,7 @@ class Obstacle:
             return straight
         points = np.concatenate([self.position[None], self.path])
         s = np.maximum(age / self.path_dt, 0.0)
-        i = np.minimum(s.astype(int), len(points) - 2)
+        i = np.minimum(s, len(points) - 2).astype(int)  # as a float first: it may not fit an int
         along = points[i] + (s - i)[..., None] * (points[i + 1] - points[i])
         return np.where((age >= 0.0)[..., None], along, straight)
 

@@ -10,10 +10,10 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from nmpc_control.obstacle import MAX_GROWTH, Obstacle, surface_distance
+from nmpc_control.obstacle import MAX_GROWTH, MIN_PATH_DT, Obstacle, surface_distance
 
 SHAPES = ("sphere", "cylinder", "box")
-ROUND = 1.0  # [m] least radius of the sphere that stands for the flat part of a surface
+ROUND = 1.0  # [m] least radius of a sphere that stands for a flat surface
 
 
 _ROWS = ("_position", "_velocity", "_stamp", "_growth", "_shape", "_size", "bounding")
@@ -64,13 +64,13 @@ class ObstacleField:
 
     @cached_property
     def unusable(self) -> Tuple[str, ...]:
-        """Ids of those that are nowhere, or have no size."""
+        """Ids of those that are nowhere, have no size, or a path without a spacing."""
         numbers = np.hstack([self._position, self._velocity, self._size])
         good = np.isfinite(numbers).all(axis=1) & (self._size > 0.0).all(axis=1)
         good &= np.isfinite(self._stamp) & np.isfinite(self._growth)
         for i in self._paths:
             o = self.obstacles[i]
-            good[i] &= bool(np.isfinite(o.path).all()) and o.path_dt > 0.0
+            good[i] &= bool(np.isfinite(o.path).all()) and o.path_dt >= MIN_PATH_DT
         return tuple(name for name, ok in zip(self.ids, good) if not ok)
 
     @property
@@ -107,7 +107,8 @@ class ObstacleField:
         """Return spheres that touch the surfaces where they are nearest to points (M, 3) [m].
 
         A sphere is itself; beside a cylinder it is the endless one; a flat surface is met by a
-        sphere of ``ROUND`` behind the nearest point, so that it is passed at its edges.
+        sphere as large as the body behind the nearest point: nearly flat in the middle, and
+        passed at the edges.
         """
         centres = self.centres(times)
         radius = self.growth(times) + self._size[:, :1]
@@ -120,8 +121,10 @@ class ObstacleField:
         if flat.any():
             which = np.nonzero(flat)[0]
             nearest, normal = _nearest(offset[flat], self._shape[which], self._size[which])
-            centres[flat] += nearest - ROUND * normal
-            radius[flat] += ROUND - self._size[which, 0]
+            extent = np.where(self._shape[which] == SHAPES.index("box"), 0.5, [1.0])
+            across = np.maximum(extent * self._size[which].max(axis=1), ROUND)
+            centres[flat] += nearest - across[:, None] * normal
+            radius[flat] += across - self._size[which, 0]
         return Spheres(centres, vertical, radius)
 
 

@@ -5,24 +5,27 @@ Every sender speaks for its own list only. What it says is judged entry by entry
 counted and leaves the last good knowledge of its obstacle in place, which grows old. One that
 stands still never ages. One that moves grows: at the rate its sender gave, and at least at the
 default rate once nothing was heard of it for ``age_limit``; after ``stale_after`` it is stale,
-which the guard answers by braking, until something new is heard or the sender is forgotten.
+which the guard answers by braking, until something new is heard or the sender is forgotten. So is
+one that is too old, or in a frame that was not known, when it is heard of first: where it is now is
+not known either.
 """
 
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_params import ObstacleParameters
 from nmpc_control.obstacle_sighting import MAX_OBSTACLES, Sighting, to_obstacle
 
-DUPLICATE, FUTURE, PAST, BACKWARDS, NO_ROOM = (
+DUPLICATE, FUTURE, PAST, BACKWARDS, NO_ROOM, UNPLACED = (
     "duplicate id",
     "from the future",
     "too old",
     "backwards in time",
     "no room",
+    "frame",  # not known at the time of the entry
 )
 
 
@@ -55,9 +58,9 @@ class ObstacleMemory:
         self.rejected: "Counter[str]" = Counter()
         self.heard = -math.inf  # [s] when the newest message came
         self._known: Dict[str, Obstacle] = {}
-        self._gone_from_start: Set[str] = set()  # known ones that were seen to move
         self._tracks: Dict[str, Dict[str, _Track]] = {}  # by sender and id
         self._heard: Dict[str, float] = {}  # [s] by sender of whom something is known
+        self._unseen: Dict[str, Dict[str, str]] = {}  # why, of what moves, by sender and id
         self._owner: Dict[str, str] = {}  # sender whose obstacle carries the bare id
         self._obstacles: Tuple[Obstacle, ...] = ()
         self._due = -math.inf  # [s] when the obstacles next change by themselves
@@ -65,7 +68,8 @@ class ObstacleMemory:
     def set_known(self, obstacles: Sequence[Obstacle]) -> None:
         """Replace those that are known without being heard of, as from a scenario.
 
-        They stand still. One of the same id that a sender reports takes the place of the known.
+        They stand still. One of the same id takes the place of the known while a sender reports it:
+        one that moved and is seen no more may be where the scenario says.
         """
         still = [o if o.stamp is None else replace(o, stamp=None) for o in obstacles]
         self.reject(NO_ROOM, max(0, len(still) - MAX_OBSTACLES))
@@ -86,6 +90,7 @@ class ObstacleMemory:
         room = MAX_OBSTACLES - len(self._known) - sum(map(len, self._tracks.values()))
         after: Dict[str, _Track] = {}
         refused: List[Tuple[str, str]] = []
+        unseen: Dict[str, str] = {}
         for sighting, found in judged:
             old = before.get(sighting.id)
             if not found and sighting.id in after:
@@ -102,6 +107,9 @@ class ObstacleMemory:
                 found = NO_ROOM if room < 0 else ""
             if found:
                 refused.append((sighting.id, found))
+                if found in (PAST, UNPLACED) and sighting.moves:
+                    age = f"{t - sighting.stamp:.1f} s old"
+                    unseen[sighting.id] = age if found == PAST else "of no use: frame not known"
             elif old is not None and old.sighting == sighting:
                 after[sighting.id] = old
             else:
@@ -112,6 +120,8 @@ class ObstacleMemory:
                 after.setdefault(name, before[name])
         self.heard = t
         self._replace(t, sender, before, after)
+        moving = {name for name, track in after.items() if track.moves}
+        self._set_unseen(sender, {n: why for n, why in unseen.items() if n not in moving})
         return refused
 
     def reject(self, kind: str, count: int = 1) -> None:
@@ -124,15 +134,18 @@ class ObstacleMemory:
         before = self._tracks.get(sender, {})
         after = {n: track for n, track in before.items() if name and n != name}
         self._replace(self._heard.get(sender, -math.inf), sender, before, after)
-        return len(before) - len(after)
+        unseen = self._unseen.get(sender, {})
+        left = {n: why for n, why in unseen.items() if name and n != name}
+        self._set_unseen(sender, left)
+        return len({*before, *unseen} - {*after, *left})
 
     def start_anew(self) -> None:
         """Forget what carries a time, as after a jump of the clock; what stands still stays."""
         for sender, before in list(self._tracks.items()):
             after = {name: track for name, track in before.items() if not track.moves}
             self._replace(-math.inf, sender, before, after)
+        self._unseen.clear()
         self.heard = self._due = -math.inf
-        self._gone_from_start.clear()
 
     def obstacles(self, t: float) -> Tuple[Obstacle, ...]:
         """Return what is known at ``t`` [s]: the same tuple for as long as nothing changes."""
@@ -155,7 +168,15 @@ class ObstacleMemory:
                     return f"{sender} reported moving obstacles and is silent for {silence:.1f} s"
                 age = t - track.obstacle.stamp
                 return f"what {sender} says of obstacle {name} is {age:.1f} s old"
+        for sender, unseen in self._unseen.items():
+            name, why = next(iter(unseen.items()))
+            return f"what {sender} says of obstacle {name} is {why}"
         return ""
+
+    def _set_unseen(self, sender: str, unseen: Dict[str, str]) -> None:
+        self._unseen.pop(sender, None)
+        if unseen:
+            self._unseen[sender] = unseen
 
     def summary(self, t: float) -> Summary:
         """Return figures for people at ``t`` [s]."""
@@ -173,8 +194,6 @@ class ObstacleMemory:
     def _track(self, sender: str, sighting: Sighting) -> _Track:
         owner = self._owner.setdefault(sighting.id, sender)
         name = sighting.id if owner == sender else f"{sighting.id}@{sender}"
-        if sighting.moves and sighting.id in self._known:
-            self._gone_from_start.add(sighting.id)
         return _Track(sighting, to_obstacle(sighting, name))
 
     def _replace(
@@ -199,7 +218,7 @@ class ObstacleMemory:
     def _current(self, t: float) -> Iterable[Obstacle]:
         heard = {name for tracks in self._tracks.values() for name in tracks}
         for name, obstacle in self._known.items():
-            if name not in heard and name not in self._gone_from_start:
+            if name not in heard:
                 yield obstacle
         for tracks in self._tracks.values():
             for track in tracks.values():

@@ -9,7 +9,7 @@ from typing import NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from nmpc_control.obstacle import Obstacle
+from nmpc_control.obstacle import MIN_PATH_DT, Obstacle
 
 MAX_OBSTACLES = 256  # [1] in one list, and known at a time
 MAX_ID = 64  # [1] characters
@@ -60,7 +60,7 @@ def fault(s: Sighting) -> str:
 
 
 def _path_is_sound(s: Sighting) -> bool:
-    if len(s.path) > 3 * MAX_PATH or len(s.path) % 3 or s.path_dt <= 0.0:
+    if len(s.path) > 3 * MAX_PATH or len(s.path) % 3 or s.path_dt < MIN_PATH_DT:
         return False
     points = np.array((*s.position, *s.path)).reshape(-1, 3)
     if not (np.abs(points) <= MAX_REACH).all():  # NaN is not either

@@ -6,6 +6,7 @@ leads through an obstacle, each tick tries some other ways round (``guides``), a
 cheaper by more than a little replaces the solution; the little keeps the side from flipping.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import List, Optional, Protocol, Sequence
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from nmpc_control.guides import SIDES, Turns, conflicts, eased, sides, way_round
 from nmpc_control.obstacle import Obstacle
+from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.ocp import PARTS, Instance, Structure
 from nmpc_control.packing import pack_stages
 from nmpc_control.slots import Slots
@@ -22,7 +24,10 @@ from nmpc_control.state import NU, NX, POSITION, VELOCITY
 _PAUSE = 3  # ticks from one try to the next while there is a solution
 _AT_ONCE = 3  # sides tried in a tick without one; the others one a tick, for a tick has to end
 _BETTER = 0.95  # of its cost: what is dearer than this is no reason to change
-_SHORT_CUT, _TOUCH = 1e6, 0.02  # [1/m] of a violation beyond this many metres
+_SHORT_CUT, _TOUCH = 1e6, 0.1  # [1/m] of entering margins by more than this many metres
+_BODIES = 8  # times that a way is pushed on where a body turns out to be wider
+_IN_TIME = 4  # stages of sideways motion that a way may lack at its start
+_STOPPING = 0.7  # [s] time constant of the stop that is tried where every way leads through
 _SIDEWAYS = 1.5  # [m/s] of a way away from the reference
 
 
@@ -53,6 +58,21 @@ class Posed:
         """Return the numbers for the solver, with obstacles near some paths (N + 1, 3) [m]."""
         data = slots.fill(self.obstacles, self.times, paths, self.margin, self.reach, self.between)
         return self._with(self.x_ref, data, self.theta)
+
+    def short_cut(self, field: ObstacleField, solution: Solution) -> float:
+        """Return how much deeper [m] a solution leads into margins than the aircraft is now.
+
+        On the true bodies, also halfway between the stages; a touch is none.
+        """
+        stages = solution.states[:, POSITION]
+        middle = (stages[1:] + stages[:-1]) / 2.0
+        half = (self.times[1:] + self.times[:-1]) / 2.0
+        least = min(
+            field.distances(stages, self.times).min(initial=np.inf),
+            field.distances(middle, half).min(initial=np.inf),
+        )
+        now = field.distances(stages[:1], self.times[:1]).min(initial=np.inf)
+        return max(0.0, min(self.margin, now) - least - _TOUCH)
 
     def free(self, path: np.ndarray) -> Instance:
         """Return the problem of following a path (N + 1, 3) [m] without obstacles."""
@@ -100,28 +120,67 @@ class OtherWays:
         """
         reference = eased(problem.x_ref[:, POSITION], problem.x0[POSITION], problem.times)
         spheres = slots.field.spheres(reference, problem.times)
+        field = slots.field
         best = Choice(solution, slots, blocked=conflicts(spheres, problem.margin, reference))
         self._ticks += 1
         at_once = not warm or not solution.found  # else a try now and then is enough
-        due = self._tries and (at_once or self._owed or self._ticks % _PAUSE == 0)
         if not best.blocked.any():
             self._owed = 0
             return best
-        if not due:
+        is_short_cut = problem.short_cut(field, solution) > 0.0
+        now = at_once or is_short_cut or self._owed
+        if not self._tries or not (now or self._ticks % _PAUSE == 0):
             return best
+        ways = [self._stay(problem)] if is_short_cut else []
         across = sides(reference[-1] - reference[0])
-        slope = _SIDEWAYS * problem.structure.dt
         for index in self._due(at_once):
-            way = way_round(spheres, problem.margin, reference, across[index], slope)
+            ways.append(self._round(problem, field, reference, across[index]))
+        for way in ways:
             if way is None:
                 continue
             seats = slots.copy()
             instance = problem.instance(seats, [way, reference])
             other = solver.solve(instance, self._guess(solver, problem, way))
-            if other.found and _merit(other) < _BETTER * _merit(best.solution):
+            if other.found and _merit(problem, field, other) < _BETTER * _merit(
+                problem, field, best.solution
+            ):
                 best = replace(best, solution=other, slots=seats)
                 self.changes += 1
         return best
+
+    def _round(
+        self, problem: Posed, field: ObstacleField, reference: np.ndarray, side: np.ndarray
+    ) -> Optional[np.ndarray]:
+        """Return the reference pushed out of all margins to one side, or None.
+
+        Where the body is so near that there is no room to get aside on the way, first aside.
+        """
+        way = self._pushed(problem, field, reference, side)
+        if way is None:
+            return None
+        late = math.ceil(np.linalg.norm(way[0] - reference[0]) / (_SIDEWAYS * problem.structure.dt))
+        if late < _IN_TIME:
+            return way
+        late = min(late, len(reference) - 1)
+        waiting = np.concatenate([np.tile(reference[0], (late, 1)), reference[:-late]])
+        return self._pushed(problem, field, waiting, side)
+
+    def _pushed(
+        self, problem: Posed, field: ObstacleField, path: np.ndarray, side: np.ndarray
+    ) -> Optional[np.ndarray]:
+        """Spheres stand for flat bodies only where the path is: they are asked for anew on it."""
+        way: Optional[np.ndarray] = path
+        slope = _SIDEWAYS * problem.structure.dt
+        for _ in range(_BODIES):
+            way = way_round(field.spheres(way, problem.times), problem.margin, way, side, slope)
+            if way is None or (field.distances(way, problem.times) >= problem.margin).all():
+                return way
+        return None
+
+    def _stay(self, problem: Posed) -> np.ndarray:
+        """Return the way of a stop (N + 1, 3) [m]."""
+        ahead = _STOPPING * -np.expm1(-(problem.times - problem.times[0]) / _STOPPING)
+        return problem.x0[POSITION] + ahead[:, None] * problem.x0[VELOCITY]
 
     def _due(self, at_once: bool) -> List[int]:
         """Return which sides to try in this tick: a count, for a clock is never the same."""
@@ -144,13 +203,13 @@ class OtherWays:
         return Guess(states, np.array(inputs))
 
 
-def _merit(solution: Solution) -> float:
-    """Return the cost of a solution; a margin that it enters costs more than any way is worth.
+def _merit(problem: Posed, field: ObstacleField, solution: Solution) -> float:
+    """Return the cost of a solution; a short cut costs more than any way is worth.
 
-    The L1 penalty is exact about where a way leads, not about which: for a goal far beyond, a short
-    cut through a thin margin could be cheaper than to wait.
+    The L1 penalty is exact about where a way leads, not about which: for a goal far beyond, one
+    through a thin body or margin could be cheaper than to wait.
     """
-    return solution.cost + _SHORT_CUT * max(0.0, solution.violation - _TOUCH)
+    return solution.cost + _SHORT_CUT * problem.short_cut(field, solution)
 
 
 @dataclass(frozen=True)

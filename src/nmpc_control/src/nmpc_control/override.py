@@ -55,6 +55,7 @@ class Override:
         self.remark = ""  # why it would brake, but the plan is better
         self._until = -math.inf
         self._reason = ""
+        self._evades = False  # obstacles that are too long unseen, because braking is worse
 
     def brake_clearance(self, state: np.ndarray, t: float, obstacles: ObstacleField) -> float:
         """Return how near [m] a brake comes to an obstacle, and standing still after it.
@@ -68,6 +69,15 @@ class Override:
         latency = self.period + swing / 2.0
         way = way_to_stop(state, self.vehicle, self.brake, latency, EXPECTED)
         return clearance_of(way, self.horizon, t, obstacles, self.vehicle.radius)
+
+    def time_to_stop(self, state: np.ndarray) -> float:
+        """Return how long [s] a stop takes at most, counted from the command.
+
+        Args:
+            state: (10,) when a command sent now takes effect.
+        """
+        way = way_to_stop(state, self.vehicle, self.brake, self.period, self.params.factor)
+        return self.vehicle.delay + way.duration
 
     def reason(
         self,
@@ -87,12 +97,35 @@ class Override:
             verdict: now, on the plan that would be flown.
         """
         self.remark = ""
+        if stale and self._must_evade(t, state, obstacles, verdict):
+            self.active, self._until = False, -math.inf
+            self.remark = f"{stale}, but braking would come nearer to them than the plan"
+            return ""
+        self._evades = self._evades and bool(stale)
         reason = stale or self._no_room(t, state, obstacles, verdict)
         if reason and (stale or not self.active):
             self._until = t + self.params.dwell
         self._reason = reason or self._reason
         self.active = bool(reason) or (self.active and t < self._until)
         return self._reason if self.active else ""
+
+    def _must_evade(
+        self,
+        t: float,
+        state: Optional[np.ndarray],
+        obstacles: ObstacleField,
+        verdict: Verdict,
+    ) -> bool:
+        """Return whether who brakes is met by what is expected to come, and who flies is not."""
+        p, evaded = self.params, self._evades
+        self._evades = False
+        if state is None or not verdict.ok or verdict.flown is None or obstacles.unusable:
+            return False
+        clearance = self.brake_clearance(state, t + self.vehicle.delay, obstacles)
+        if clearance >= p.evasion + (p.release if evaded else 0.0):
+            return False
+        self._evades = verdict.nearest - clearance > (-p.advantage if evaded else p.advantage)
+        return self._evades
 
     def _no_room(
         self,

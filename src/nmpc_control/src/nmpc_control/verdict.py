@@ -30,6 +30,7 @@ class PlanCheckParameters:
     minimum_clearance: float = field(metadata={"min": 0.0})  # [m] hull to surface
     growth_tolerance: float = field(metadata={"min": 0.0})  # [m] nearer than where it was entered
     clearance_horizon: float = _positive()  # [s] ahead of now; a plan is replaced long before
+    grace: float = field(metadata={"min": 0.0})  # [s] one too near far ahead is flown on
 
 
 class Finding(Enum):
@@ -80,6 +81,7 @@ class Verdict:
     nearest: float = math.inf  # [m] as clearance, within the horizon that is judged
     speed: float = 0.0  # [m/s] of the plan at that place
     inside: Optional[Inside] = None  # now; None where that was not looked at
+    conflict: float = math.inf  # [s] when it is nearer than the minimum for the first time
 
     @property
     def ok(self) -> bool:

@@ -23,15 +23,16 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_updater import DiagnosticStatusWrapper
 
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.obstacle_memory import ObstacleMemory
+from nmpc_control.obstacle_memory import UNPLACED, ObstacleMemory
 from nmpc_control.obstacle_params import load_obstacle_parameters
 from nmpc_control.obstacle_sighting import MAX_OBSTACLES, Sighting, fault, moved, to_obstacle
-from nmpc_control.ros.frames import FrameError, Frames
+from nmpc_control.ros.frames import FrameError, Frames, Place
 from nmpc_control.ros.obstacle_wire import Head, WireError, read_head, read_obstacles
 from nmpc_control.ros.subscriptions import Subscriptions
 from nmpc_msgs.msg import ObstacleArray
 
 TOPIC, ADDED_TOPIC, KNOWN_TOPIC = "obstacles", "nmpc/added_obstacles", "nmpc/known_obstacles"
+MAX_STAMPS = 64  # [1] different ones in a list that is not in the world frame, the newest
 MAX_BYTES = 500_000  # [1] of one message: the most obstacles with paths of 60 points have 420,000
 RETRY_PERIOD = 0.5  # [s] of wall time between two looks for a frame that is not known
 _IDLE = 0.005  # [s] of wall time between two looks at what waits for its turn
@@ -213,11 +214,30 @@ class ObstaclePort:
         judged = [(s, fault(s)) for s in sightings]
         if self.frames.is_world(head.frame_id):
             return judged
-        stamps = {s.stamp for s, _ in judged} or {head.stamp}
-        if not all(map(math.isfinite, stamps)) or len(stamps) > 16:
-            raise FrameError(f"{len(stamps)} different stamps in a frame that moves")
-        places = {stamp: self.frames.place(head.frame_id, stamp) for stamp in stamps}
-        return [(s if bad else moved(s, *places[s.stamp]), bad) for s, bad in judged]
+        places = self._places(head.frame_id, {s.stamp for s, bad in judged if not bad}, head.stamp)
+        return [
+            (moved(s, *places[s.stamp]), "")
+            if not bad and s.stamp in places
+            else (s, bad or UNPLACED)
+            for s, bad in judged
+        ]
+
+    def _places(self, frame_id: str, stamps: Set[float], otherwise: float) -> Dict[float, Place]:
+        """Return where a frame was at those of its newest stamps at which that is known.
+
+        Raises:
+            FrameError: it is known at none of them, or at ``otherwise`` [s] where there is none.
+        """
+        places: Dict[float, Place] = {}
+        why: Optional[FrameError] = None
+        for stamp in sorted(stamps or {otherwise}, reverse=True)[:MAX_STAMPS]:
+            try:
+                places[stamp] = self.frames.place(frame_id, stamp)
+            except FrameError as error:
+                why = error
+        if why is not None and not places:
+            raise why
+        return places
 
     def _reject(self, kind: str, sentence: str) -> None:
         with self._lock:

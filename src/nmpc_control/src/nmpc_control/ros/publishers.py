@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What nmpc_controller publishes.
 
-ROS Publishers: nmpc/plan, nmpc/prediction (every other plan), nmpc/reference, nmpc/odometry, and
-latched
+ROS Publishers: nmpc/plan, nmpc/prediction (every other plan, while the guard flies plans and
+one is found: other vehicles count on it), nmpc/reference, nmpc/odometry, and latched
 nmpc/trajectory, nmpc/obstacles, nmpc/known_obstacles, nmpc/room; tf world -> base_link;
 /diagnostics.
 """
@@ -78,7 +78,7 @@ class Publishers:
         header = Header(stamp=now, frame_id=self.frame_id)
         self._plan.publish(plan_to_msg(step, header, misses))
         self._steps += 1
-        if self._steps % 2 == 0:
+        if self._steps % 2 == 0 and step.is_promise:
             self._prediction.publish(prediction_to_msg(step, header))
         odometry = odometry_to_msg(step.estimate.vector, header, self.base_frame)
         self._odometry.publish(odometry)

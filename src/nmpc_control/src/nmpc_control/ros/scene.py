@@ -12,6 +12,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
 from nmpc_control.flown_path import FlownPath
+from nmpc_control.mode_inputs import PLANNED
 from nmpc_control.ros import markers
 from nmpc_msgs.msg import ControllerStatus, ObstacleArray, Prediction
 
@@ -93,8 +94,14 @@ class Scene:
         self._set("room", self._room, _rows(message.polygon.points))
 
     def set_status(self, message: ControllerStatus) -> None:
-        """Show the mode above the aircraft, with the trajectory's clock or the reason."""
+        """Show the mode above the aircraft, with the trajectory's clock or the reason.
+
+        Where no plan is flown, none is predicted: the last one does not stay in the picture.
+        """
         self._set("mode", self._mode, message)
+        if message.mode not in PLANNED:
+            self._set("prediction", list)
+            self._set("horizon", list)
 
     def changes(self) -> MarkerArray:
         """Return what changed since the last call, with removals of what is gone."""

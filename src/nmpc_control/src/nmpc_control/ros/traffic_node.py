@@ -4,7 +4,8 @@
 The frames of the vehicles must be connected to the world frame of this one by tf2, or be it.
 
 ROS Subscribers, of every other vehicle: nmpc/prediction (nmpc_msgs/Prediction), and where that ends
-nmpc/odometry (nav_msgs/Odometry).
+nmpc/odometry (nav_msgs/Odometry). Of this one nmpc/forget_obstacles (std_msgs/String): with the
+name of this node all others are forgotten until they speak again.
 ROS Publishers: obstacles (nmpc_msgs/ObstacleArray): them, each with the time of its own words.
 ROS Parameters:
     ~others (str): their namespaces, as in "/dji2,/dji3".
@@ -21,7 +22,7 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import Point, Vector3
 from nav_msgs.msg import Odometry
-from std_msgs.msg import Header
+from std_msgs.msg import Header, String
 
 from nmpc_control.config import config_directory, from_dict, load_yaml
 from nmpc_control.errors import ConfigError, NmpcError
@@ -46,6 +47,7 @@ class TrafficNode:
         self._lock = threading.Lock()
         self._publisher = rospy.Publisher("obstacles", ObstacleArray, queue_size=1)
         subscriptions = Subscriptions()
+        subscriptions.add("nmpc/forget_obstacles", String, self._on_forget, queue_size=10)
         for other in others:
             name = other.strip("/")
             for topic, kind, take in (
@@ -61,11 +63,9 @@ class TrafficNode:
             now = rospy.Time.now()
             with self._lock:
                 if now.to_sec() < last - self._period:
-                    self._traffic.start_anew()
-                obstacles, gone = self._traffic.report(now.to_sec())
+                    self._traffic.forget()
+                obstacles = self._traffic.report()
             last = now.to_sec()
-            for name in gone:
-                rospy.logwarn(f"{name} has been silent for long and is no obstacle any more")
             header = Header(stamp=now, frame_id=self._frames.world)
             self._publisher.publish(ObstacleArray(header, [_to_msg(o) for o in obstacles]))
             try:
@@ -74,6 +74,12 @@ class TrafficNode:
                 continue
             except rospy.ROSInterruptException:
                 break
+
+    def _on_forget(self, message: String) -> None:
+        if message.data == rospy.get_name():
+            rospy.logwarn("told to forget the other vehicles: each is known again when it speaks")
+            with self._lock:
+                self._traffic.forget()
 
     def _on_prediction(self, name: str, message: Prediction) -> None:
         count = min(len(message.poses), len(message.twists), len(message.stamps))
