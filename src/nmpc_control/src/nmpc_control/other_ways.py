@@ -102,7 +102,7 @@ class OtherWays:
         self.changes = 0
         self._turns = Turns()
         self._ticks = 0
-        self._owed = 0  # sides of a round that began at once which had no turn yet
+        self._owed = 0  # sides of a round that had no turn yet
         self._shooting = shooting
 
     def improve(
@@ -124,14 +124,16 @@ class OtherWays:
         best = Choice(solution, slots, blocked=conflicts(spheres, problem.margin, reference))
         self._ticks += 1
         at_once = not warm or not solution.found  # else a try now and then is enough
+        if not best.blocked.any():
+            self._owed = 0
+            return best
         is_short_cut = problem.short_cut(field, solution) > 0.0
         now = at_once or is_short_cut or self._owed
-        due = self._tries and (now or self._ticks % _PAUSE == 0)
-        if not (due and best.blocked.any()):
+        if not self._tries or not (now or self._ticks % _PAUSE == 0):
             return best
         ways = [self._stay(problem)] if is_short_cut else []
         across = sides(reference[-1] - reference[0])
-        for index in self._turns.take(self._count(at_once)):
+        for index in self._due(at_once):
             ways.append(self._round(problem, field, reference, across[index]))
         for way in ways:
             if way is None:
@@ -180,13 +182,15 @@ class OtherWays:
         ahead = _STOPPING * -np.expm1(-(problem.times - problem.times[0]) / _STOPPING)
         return problem.x0[POSITION] + ahead[:, None] * problem.x0[VELOCITY]
 
-    def _count(self, at_once: bool) -> int:
-        """Return how many sides to try in this tick; a count, for a clock is never the same."""
+    def _due(self, at_once: bool) -> List[int]:
+        """Return which sides to try in this tick: a count, for a clock is never the same."""
         if not self._shooting:
-            return self._tries
+            return self._turns.take(self._tries)
+        if at_once and not self._owed:
+            self._turns, self._owed = Turns(), SIDES  # a round begins with the right
         count = max(_AT_ONCE, self._tries) if at_once else self._tries
-        self._owed = max(0, (SIDES if at_once else self._owed) - count)
-        return count
+        self._owed = max(0, self._owed - count)
+        return self._turns.take(count)
 
     def _guess(self, solver: Solver, problem: Posed, way: np.ndarray) -> Guess:
         follow = problem.free(way)
