@@ -25,17 +25,17 @@ def heading(azimuth, climb):
     return np.array([level * np.cos(azimuth), level * np.sin(azimuth), climb])
 
 
-def at_speed(plant, velocity, gps, gathers):
+def at_speed(plant, velocity, gps, gathers, wind=(0.0, 0.0, 0.0)):
     """Return a flight at about a velocity (3,) [m/s], still gathering speed or not, and its way."""
     start = velocity * (0.7 if gathers else 1.0)
-    flight = GuardedM100(plant, start, following(velocity), gps=gps)
+    flight = GuardedM100(plant, start, following(velocity), gps=gps, wind=wind)
     flight.run(0.4)
     return flight, way_of(flight)
 
 
 def way_of(flight):
     x = flight.in_effect()
-    return way_to_stop(x, flight.vehicle, PARAMS.brake, TICK, PARAMS.stopping.factor)
+    return way_to_stop(x, flight.known, PARAMS.brake, TICK, PARAMS.stopping.factor)
 
 
 def fits(flight, way, obstacle):
@@ -60,13 +60,14 @@ def brake(flight):
     offset=st.floats(-1.0, 1.0),
     beyond=st.floats(0.0, 0.5),
     gathers=st.booleans(),
+    wind=st.floats(-8.0, 8.0),
 )
 def test_where_a_stop_fits_the_brake_does_not_hit(
-    plant, gps, speed, azimuth, climb, radius, offset, beyond, gathers
+    plant, gps, speed, azimuth, climb, radius, offset, beyond, gathers, wind
 ):
     """The sphere is put as near as the condition allows, or a little farther; on truth."""
     ahead = heading(azimuth, climb)
-    flight, way = at_speed(plant, speed * ahead, gps, gathers)
+    flight, way = at_speed(plant, speed * ahead, gps, gathers, wind * heading(azimuth, 0.0))
     aside = np.cross(way.direction, [0.0, 0.0, 1.0]) * offset * (radius + flight.vehicle.radius)
     ball = near = None
     for distance in np.arange(0.0, 20.0, 0.02):
@@ -91,6 +92,32 @@ def test_twin_where_a_stop_is_far_from_fitting_it_hits(plant, gps):
         assert not fits(flight, way, wall)
         brake(flight)
         assert flight.clearance(wall) < 0.0
+
+
+def braked_in_tail_wind(plant, params):
+    """Return the way [m] that the own brake took from 3 m/s, and the drift [m/s] after it."""
+    flight = GuardedM100(plant, [3.0, 0, 0], following([3.0, 0, 0]), params, False, (8.0, 0, 0))
+    flight.run(2.0)
+    needed, start = way_of(flight).needed, flight.in_effect()[0]
+    brake(flight)
+    flight.run(2.0)
+    travel = [p[0] - start for p in flight.path]
+    return needed, max(travel), abs(flight.aircraft.truth.velocity[0])
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_the_own_brake_makes_up_for_a_tail_wind_that_was_learnt(plant):
+    needed, took, drift = braked_in_tail_wind(plant, PARAMS)
+    assert took < needed
+    assert drift < 0.1
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_twin_that_learns_nothing_is_carried_on(plant):
+    none = dataclasses.replace(PARAMS.disturbance, horizontal=0.0)
+    _, took, _ = braked_in_tail_wind(plant, dataclasses.replace(PARAMS, disturbance=none))
+    learnt = braked_in_tail_wind(plant, PARAMS)[1]
+    assert took > learnt + 0.05
 
 
 WALL = Obstacle("wall", np.array([12.5, 0.0, HEIGHT]), np.array([1.0, 40.0, 40.0]), "box")

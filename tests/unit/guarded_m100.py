@@ -62,13 +62,14 @@ def steered(acceleration, tilt=0.436):
 class GuardedM100:
     """One flight: the guard streams at its rate, the solver's plans come unless it is None."""
 
-    def __init__(self, plant, velocity, solver, params=PARAMS, gps=True):
+    def __init__(self, plant, velocity, solver, params=PARAMS, gps=True, wind=(0, 0, 0)):
         flight = load_parameters(plant)
         self.vehicle = flight.vehicle
         self.guard = Guard(params, flight.vehicle, flight.limits)
         self.inbox = GuardInbox(params)
         self.aircraft = SimulatedM100(load_preset(plant))
         self.aircraft.place([0.0, 0.0, HEIGHT], velocity, authority=True)
+        self.aircraft.plant.wind = tuple(map(float, wind))
         self.inbox.authority = True
         self.gps = gps
         self.solver = solver
@@ -78,11 +79,19 @@ class GuardedM100:
         while self.inbox.estimator.estimate(self.t) is None:
             self._listen()
         self.guard.mode = Mode.FLYING
+        if params.disturbance.horizontal > 0.0:  # as learnt on the flight so far
+            learnt = self.vehicle.drag * np.array(wind)
+            self.guard._disturbance.acceleration = learnt
         self.tick()
 
     @property
     def t(self):
         return self.aircraft.t
+
+    @property
+    def known(self):
+        """The vehicle with what the guard has learnt."""
+        return self.guard.override.vehicle
 
     @property
     def obstacles(self):
@@ -111,7 +120,7 @@ class GuardedM100:
     def tick(self):
         """Let the guard act once, and the aircraft fly on for its period."""
         if self.solver is not None and self._count % round(SOLVE / TICK) == 0:
-            self.inbox.add_plan(*self.solver(self.t, self.in_effect(), self.vehicle))
+            self.inbox.add_plan(*self.solver(self.t, self.in_effect(), self.known))
         self._count += 1
         inputs = self.inbox.inputs(self.t)
         telemetry = dataclasses.replace(

@@ -6,7 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nmpc_control.disturbance_estimate import DisturbanceEstimate, steady_input
+from nmpc_control.controller import Controller
+from nmpc_control.disturbance_estimate import DisturbanceEstimate, learnable, steady_input
+from nmpc_control.guard import Guard
+from nmpc_control.guard_params import load_guard_parameters
 from nmpc_control.params import load_parameters, load_vehicle
 from nmpc_control.prediction import derivative, predict
 from nmpc_control.state import GRAVITY, VELOCITY, hover_state
@@ -54,6 +57,26 @@ def test_a_constant_acceleration_is_recovered_in_three_seconds():
     flight.run(3.0 + DT)
     assert error(flight.estimate.acceleration) < 0.05
     assert flight.estimate.miss < 0.05
+
+
+def test_a_thrust_that_is_not_sent_teaches_nothing_vertical():
+    flight = Flight(parameters=learnable(PARAMETERS, "velocity"))
+    flight.run(3.0 + DT)
+    assert flight.estimate.acceleration[2] == 0.0
+    assert error(flight.estimate.acceleration[:2], WIND[:2]) < 0.05
+    assert flight.estimate.miss < 0.05
+    twin = Flight(parameters=learnable(PARAMETERS, "thrust"))
+    twin.run(3.0 + DT)
+    assert twin.estimate.acceleration[2] == pytest.approx(WIND[2], rel=0.05)
+
+
+def test_guard_and_controller_know_what_is_sent():
+    params, flown = load_guard_parameters(), load_parameters()
+    by_velocity = replace(params, vertical_command="velocity")
+    guards = [Guard(p, VEHICLE, flown.limits) for p in (params, by_velocity)]
+    assert [g._disturbance.parameters.vertical > 0.0 for g in guards] == [True, False]
+    controllers = [Controller(flown), Controller(flown, "velocity")]
+    assert [c._disturbance.parameters.vertical > 0.0 for c in controllers] == [True, False]
 
 
 def test_and_through_the_noise_of_velocities():

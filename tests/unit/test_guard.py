@@ -9,6 +9,7 @@ import pytest
 from flight_stub import LIMITS, PARAMS, TICK, VEHICLE, Aircraft, Flight, make_plan
 
 from nmpc_control import dji
+from nmpc_control.braking import MADE_UP
 from nmpc_control.dji import FlightStatus, RcMode
 from nmpc_control.guard_data import Action
 from nmpc_control.ladder import Rung
@@ -407,7 +408,7 @@ def test_the_brake_is_bounded_and_changes_slowly():
     applied = np.array(
         [o.applied for _, _, o in flight.log if o.mode is Mode.BRAKING and o.applied]
     )
-    largest = math.atan(PARAMS.brake.deceleration / 9.81)
+    largest = math.atan((PARAMS.brake.deceleration + MADE_UP) / 9.81)
     assert np.hypot(applied[:, 1], applied[:, 2]).max() <= largest * 1.02
     change = np.abs(np.diff(applied[:, 1:3], axis=0)).max()
     assert change <= PARAMS.brake.tilt_rate * TICK + 1e-9

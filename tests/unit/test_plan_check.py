@@ -10,13 +10,13 @@ from flight_stub import LIMITS, PARAMS, VEHICLE, make_plan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nmpc_control import prediction
+from nmpc_control import plan_consistency, prediction
 from nmpc_control.model import model_parameters, step_function
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import load_vehicle
 from nmpc_control.plan_check import Finding, check_flown, check_plan
 from nmpc_control.plan_consistency import euler_step, rk4_step
-from nmpc_control.state import GRAVITY, hover_input, hover_state
+from nmpc_control.state import GRAVITY, Plan, hover_input, hover_state
 
 START = hover_state(np.array([1.0, 2.0, 3.0]))
 CHECK = PARAMS.plan_check
@@ -411,3 +411,33 @@ def test_coarse_steps_are_those_of_the_controller(name):
     for integrator, step in (("rk4", rk4_step), ("euler", euler_step)):
         theirs = step_function(0.1, integrator)(x, u, model_parameters(vehicle))
         assert np.ravel(theirs.full()) == pytest.approx(step(x, u, 0.1, vehicle), abs=1e-12)
+
+
+def slowed_by_nothing(deceleration):
+    """Return a plan whose states slow down from 2.5 m/s to rest, while its inputs hover."""
+    lie = dataclasses.replace(VEHICLE, disturbance=np.array([-deceleration, 0.0, 0.0]))
+    states, u = [np.array([0, 0, 5.0, 0, 0, 0, 2.5, 0, 0, 0])], hover_input()
+    for _ in range(40):
+        x = np.array(prediction.step(states[-1], u, 0.1, lie))
+        x[6] = max(x[6], 0.0)
+        states.append(x)
+    return Plan(10.0, 0.1, VEHICLE.delay, np.array(states), np.tile(u, (40, 1)))
+
+
+@pytest.mark.parametrize("deceleration", [1.6, 2.5])
+def test_a_brake_that_the_inputs_do_not_make_is_seen_in_the_sum(deceleration, monkeypatch):
+    plan = slowed_by_nothing(deceleration)
+    verdict = check(plan, state=plan.states[0])
+    assert verdict.finding is Finding.DYNAMICS
+    assert "on average" in verdict.sentence
+    monkeypatch.setattr(plan_consistency, "SUMMED", np.inf)
+    assert check(plan, state=plan.states[0]).ok, "each stage alone is within its tolerance"
+
+
+def test_another_estimate_of_the_wind_is_no_departure():
+    vehicle = dataclasses.replace(VEHICLE, disturbance=np.array([0.8, -0.6, 0.4]))
+    states, u = [START], hover_input()
+    for _ in range(30):
+        states.append(np.array(prediction.step(states[-1], u, 0.1, vehicle)))
+    plan = Plan(10.0, 0.1, VEHICLE.delay, np.array(states), np.tile(u, (30, 1)))
+    assert check(plan).ok

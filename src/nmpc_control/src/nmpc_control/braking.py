@@ -10,6 +10,9 @@ import numpy as np
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.state import GRAVITY, POSITION, VELOCITY, YAW, hover_input
 
+# [m/s^2] learnt push that is made up for beyond the deceleration: both fit into a tilt of 25 deg
+MADE_UP = 1.5
+
 
 def _positive() -> float:
     return field(metadata={"min": 1e-6})
@@ -52,18 +55,22 @@ class Brake:
         self._height: Optional[float] = None
         self._thrust_bias = 0.0
 
-    def input(self, state: np.ndarray, dt: float, has_position: bool) -> np.ndarray:
+    def input(
+        self, state: np.ndarray, dt: float, has_position: bool, push: Sequence[float] = (0, 0, 0)
+    ) -> np.ndarray:
         """Return the input (4,) that brakes and, once at rest, holds.
 
         Args:
             state: (10,) expected when the input takes effect.
             dt: [s] since the last call.
             has_position: whether the position in the state is to be trusted.
+            push: (3,) [m/s^2] what the model was found to lack, as wind; it is made up for.
         """
         if not has_position:
             self._rest = self._height = None
-        horizontal = self._horizontal(state, has_position)
-        vertical = self._vertical(state, dt, has_position)
+        made_up = _shorten(np.array(push[:2], dtype=float), MADE_UP)
+        horizontal = self._horizontal(state, has_position) - made_up
+        vertical = self._vertical(state, dt, has_position) - push[2]
         self._previous = self._limited(
             self._thrust_vector_input(horizontal, vertical, state[YAW]), dt
         )

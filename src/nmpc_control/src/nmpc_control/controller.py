@@ -10,7 +10,7 @@ from typing import Deque, Optional, Sequence, Tuple
 
 import numpy as np
 
-from nmpc_control.disturbance_estimate import DisturbanceEstimate, steady_input
+from nmpc_control.disturbance_estimate import DisturbanceEstimate, learnable, steady_input
 from nmpc_control.errors import ProblemError
 from nmpc_control.estimator import Estimator, StateEstimate
 from nmpc_control.itinerary import Itinerary
@@ -59,7 +59,8 @@ class Controller:
     Telemetry and obstacles come in between.
     """
 
-    def __init__(self, parameters: Parameters) -> None:
+    def __init__(self, parameters: Parameters, vertical_command: str = "thrust") -> None:
+        """Begin without a state; ``vertical_command`` is what the guard sends for thrust."""
         self.parameters = parameters
         self.estimator = Estimator()
         self.itinerary = Itinerary(parameters.flight)
@@ -72,7 +73,7 @@ class Controller:
         self._inputs: Deque[Tuple[float, np.ndarray]] = deque()
         self._unknown = -np.inf  # [s] when an input was sent last that the model does not have
         self._field_of = FieldOf()
-        self._disturbance = DisturbanceEstimate(parameters.disturbance)
+        self._disturbance = DisturbanceEstimate(learnable(parameters.disturbance, vertical_command))
 
     def use(self, parameters: Parameters) -> None:
         """Take over other weights, limits or margins from the next step on."""
@@ -151,7 +152,7 @@ class Controller:
     def _learn(self, t: float, x: np.ndarray) -> Vehicle:
         """Return the model with what it was found to lack, also told to the optimiser."""
         estimate, vehicle = self._disturbance, self.parameters.vehicle
-        if not self.engaged:
+        if not (self.engaged or self.braking):
             estimate.reset()
         elif t - self._unknown < vehicle.delay + _FORGOTTEN:
             estimate.pause()

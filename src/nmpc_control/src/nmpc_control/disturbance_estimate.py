@@ -8,6 +8,7 @@ second model. Nothing here reaches the solver, the guard estimates on its own.
 """
 
 import math
+from dataclasses import replace
 from typing import Optional, Sequence, Tuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from nmpc_control.state import GRAVITY, VELOCITY
 
 _LONGEST = 0.3  # [s] between two states; after a longer gap nothing is learnt
 _SHORTEST = 0.005  # [s] closer ones say nothing
+_JUMP = 5.0  # [1] times the bound: more is a source that jumps, or a blow, and counts as this
 _MISS_TIME = 1.0  # [s] of the low-pass on how far velocities are missed
 
 
@@ -28,6 +30,11 @@ def steady_input(vehicle: Vehicle, yaw: float) -> np.ndarray:
     thrust = math.sqrt(x * x + y * y + z * z)
     roll, pitch = -math.asin(left / thrust), math.atan2(forward, z)
     return np.array([thrust, roll / vehicle.roll.gain, pitch / vehicle.pitch.gain, 0.0])
+
+
+def learnable(parameters: Disturbance, vertical_command: str) -> Disturbance:
+    """Return the parameters for what is sent: a thrust that is not sent teaches nothing."""
+    return parameters if vertical_command == "thrust" else replace(parameters, vertical=0.0)
 
 
 class DisturbanceEstimate:
@@ -74,8 +81,10 @@ class DisturbanceEstimate:
         expected = predict(last[1], last[0], t, inputs, vehicle)
         miss = state[VELOCITY] - expected[VELOCITY]
         p = self.parameters
-        learnt = self.acceleration + miss * min(1.0 / p.time_constant, 1.0 / dt)
         most = np.array([p.horizontal, p.horizontal, p.vertical])
+        miss = np.where(most > 0.0, miss, 0.0)
+        believed = np.clip(miss, -_JUMP * most * dt, _JUMP * most * dt)
+        learnt = self.acceleration + believed * min(1.0 / p.time_constant, 1.0 / dt)
         self.acceleration = np.clip(learnt, -most, most)
         part = min(1.0, dt / _MISS_TIME)
         self.miss = float(np.sqrt((1.0 - part) * self.miss**2 + part * float(miss @ miss)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmpc_control import modes
 from nmpc_control.braking import Brake
-from nmpc_control.disturbance_estimate import DisturbanceEstimate
+from nmpc_control.disturbance_estimate import DisturbanceEstimate, learnable
 from nmpc_control.dji import FlightStatus
 from nmpc_control.guard_data import Action, Command, GuardInputs, GuardOutput
 from nmpc_control.guard_params import GuardParameters
@@ -20,7 +20,7 @@ from nmpc_control.obstacle_field import FieldOf, ObstacleField
 from nmpc_control.override import Override
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.preflight import preflight
-from nmpc_control.sent_inputs import SentInputs
+from nmpc_control.sent_inputs import IN_FORCE, SentInputs
 from nmpc_control.setpoints import Setpoints
 from nmpc_control.situation import Situation
 from nmpc_control.state import POSITION, VELOCITY, hover_input
@@ -51,7 +51,9 @@ class Guard:
             params.stopping, params.brake, vehicle, 1.0 / params.rate, params.plan_check
         )
         self._field_of = FieldOf()
-        self._disturbance = DisturbanceEstimate(params.disturbance)
+        self._disturbance = DisturbanceEstimate(
+            learnable(params.disturbance, params.vertical_command)
+        )
         self._reason = self._code = ""
         self._failures = 0
         self._axes = None  # the last that were sent, in the last tick
@@ -127,17 +129,18 @@ class Guard:
         self.override.forget()
 
     def _learn(self, i: GuardInputs) -> None:
-        """Take what the model lacks into it; only plans are flown by inputs that it has."""
-        estimate, vehicle = self._disturbance, self.vehicle
-        if self.mode not in PLANNED:
+        """Take what the model lacks into it, and keep it while DJI's own control brakes."""
+        estimate, vehicle, sent = self._disturbance, self.vehicle, self._sent
+        if not sent.history or i.t - sent.history[-1][0] > IN_FORCE:
+            sent.unknown = i.t
+        if self.mode not in STREAMING:
             estimate.reset()
-        elif i.t - self._sent.unknown < vehicle.delay + FORGOTTEN or i.estimate is None:
+        elif i.t - sent.unknown < vehicle.delay + FORGOTTEN or i.estimate is None:
             estimate.pause()
         else:
-            history, known = self._sent.history, self._sent.vehicle
-            estimate.update(i.t, i.estimate.vector, history, known)
-        push = vehicle.disturbance + estimate.acceleration
-        self._sent.vehicle = self.ladder.vehicle = replace(vehicle, disturbance=push)
+            estimate.update(i.t, i.estimate.vector, sent.history, sent.vehicle)
+        known = replace(vehicle, disturbance=vehicle.disturbance + estimate.acceleration)
+        sent.vehicle = self.ladder.vehicle = self.override.vehicle = known
 
     def _take_plan(
         self, i: GuardInputs, obstacles: ObstacleField, brake_clearance: Callable[[], float]
@@ -248,7 +251,8 @@ class Guard:
             self._brake.begin(hover_input())  # where a brake of our own would have to go on from
             return self._setpoints.hold(rung)
         state = self._state_in_effect(i)
-        u = self._brake.input(state, dt, has_position and has_velocity)
+        push = self._sent.vehicle.disturbance
+        u = self._brake.input(state, dt, has_position and has_velocity, push)
         return self._setpoints.of_input(rung, u, 0.0)
 
     def _state_in_effect(self, i: GuardInputs) -> np.ndarray:

@@ -13,13 +13,14 @@ from typing import NamedTuple, Optional
 
 import numpy as np
 
-from nmpc_control.braking import BrakeParameters
+from nmpc_control.braking import MADE_UP, BrakeParameters
 from nmpc_control.clearance_check import Approach, approach
 from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.params import Vehicle
 from nmpc_control.state import GRAVITY, PITCH, POSITION, ROLL, VELOCITY, YAW
 
 SPACING = 0.25  # [m] of the points of a way that are handed on; what is near is refined
+LEAST_DECELERATION = 0.5  # [m/s^2] in whatever wind
 NEARER = 0.02  # [m] by which a way must lead nearer to what is too near already
 
 
@@ -102,7 +103,8 @@ def way_to_stop(
 
     Args:
         state: (10,) position and velocity; a tilt that speeds it up counts until it has decayed.
-        vehicle: for lags.
+        vehicle: for lags, and what the model lacks: more of a push along the way than the brake
+            can make up for takes from its deceleration.
         brake: the weakest brake that may have to do it.
         latency: [s] from the state to the effect of a command: dead time, period, age of the plan.
         factor: [1] on the braking distance at full deceleration.
@@ -112,7 +114,9 @@ def way_to_stop(
     direction = velocity / speed if speed > 0.0 else np.zeros(3)
     rise = max(vehicle.roll.time_constant, vehicle.pitch.time_constant)
     speed += max(0.0, float(direction @ _push(state))) * rise
-    full = speed * rise + factor * speed**2 / (2.0 * brake.deceleration)
+    push = max(0.0, float(direction @ vehicle.disturbance) - MADE_UP)
+    net = max(LEAST_DECELERATION, brake.deceleration - push)
+    full = speed * rise + factor * speed**2 / (2.0 * net)
     total = max(full, speed / brake.velocity_gain)
     return Way(state[POSITION], direction, speed, latency + rise, total - speed * rise)
 

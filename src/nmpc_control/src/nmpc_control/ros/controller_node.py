@@ -35,7 +35,11 @@ from std_msgs.msg import Empty, String
 
 from nmpc_control.controller import Controller
 from nmpc_control.errors import ConfigError, NmpcError
+<<<<<<< HEAD
 from nmpc_control.ladder import BRAKES
+=======
+from nmpc_control.guard_params import load_guard_parameters
+>>>>>>> fixc
 from nmpc_control.mode_inputs import FOLLOWED, PLANNED
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters, load_parameters, load_weights
@@ -59,7 +63,8 @@ class ControllerNode:
     def __init__(self) -> None:
         self.frame_id = rospy.get_param("~frame_id", "world")
         self.parameters = load_node_parameters()
-        self.controller = Controller(self.parameters)
+        self._vertical_command = load_guard_parameters().vertical_command
+        self.controller = Controller(self.parameters, self._vertical_command)
         self.scenario: Optional[Scenario] = None
         offered = rospy.get_param("~scenario", "")
         self._offered = load_scenario(offered) if offered else None
@@ -111,7 +116,7 @@ class ControllerNode:
 
     def _start_anew(self) -> None:
         """Forget everything that carries a time, as after a jump of the clock."""
-        self.controller = Controller(self.parameters)
+        self.controller = Controller(self.parameters, self._vertical_command)
         self._inputs.clear()
         self._port.start_anew()
         self.state.start_anew(self.controller.estimator)

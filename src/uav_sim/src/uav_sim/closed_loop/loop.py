@@ -70,7 +70,7 @@ class ClosedLoop:
         sources = sources or load_source_parameters(position_source=VICON if captured else GPS)
         is_shifted = disturbance is not None and disturbance.shift is not None
         self.senses = self.aircraft.world.moves or is_shifted  # obstacles, again and again
-        self.controller = Controller(parameters)
+        self.controller = Controller(parameters, guard_parameters.vertical_command)
         self.guard = Guard(guard_parameters, parameters.vehicle, parameters.limits)
         self.inbox = GuardInbox(guard_parameters)
         estimators = (self.controller.estimator, self.inbox.estimator)
