@@ -35,11 +35,8 @@ from std_msgs.msg import Empty, String
 
 from nmpc_control.controller import Controller
 from nmpc_control.errors import ConfigError, NmpcError
-<<<<<<< HEAD
-from nmpc_control.ladder import BRAKES
-=======
 from nmpc_control.guard_params import load_guard_parameters
->>>>>>> fixc
+from nmpc_control.ladder import BRAKES
 from nmpc_control.mode_inputs import FOLLOWED, PLANNED
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters, load_parameters, load_weights
