@@ -10,12 +10,13 @@ in_workspace := . devel/setup.bash &&
 single_thread := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 two_workers := -n 2 --dist loadscope
 
-.PHONY: help build fly bench test lint clean
+.PHONY: help build fly bench test test-long lint clean
 
 help:
 	@echo "make fly [SCENARIO=multi_obstacle] [PLANT=dji_hil] [SPEED=1.0] [RVIZ=1]   fly in the simulator, record, report"
 	@echo "make bench [BENCH_ARGS=...]   performance tables, build/bench.json, figures; ten minutes (--quick: one)"
 	@echo "make test [PYTEST_ARGS=...]   everything that continuous integration runs"
+	@echo "make test-long   the tests that take too long for it: traffic, floods of obstacles, motion capture, laser"
 	@echo "make build   system packages, Python packages and the workspace, as far as they are missing"
 	@echo "make lint    ruff and catkin_lint"
 	@echo "make clean   remove what was built; virtual environments and bags stay"
@@ -34,6 +35,9 @@ bench: build
 test: lint
 	@$(single_thread) .setup/python38.sh
 	@$(in_workspace) $(single_thread) .venv/bin/python3 -m pytest tests $(two_workers) $(PYTEST_ARGS)
+
+test-long: build
+	@$(in_workspace) $(single_thread) .venv/bin/python3 -m pytest tests $(two_workers) -m long $(PYTEST_ARGS)
 
 lint: build
 	@.venv/bin/ruff check --quiet --output-format concise .

@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from uav_sim.closed_loop.campaign.runner import fly_number
 from uav_sim.closed_loop.campaign.settings import Settings
 
@@ -41,6 +43,7 @@ def numbers(ledger):
     return {json.loads(line)["index"] for line in lines}
 
 
+@pytest.mark.long
 def test_ctrl_c_keeps_what_is_finished_and_flights_do_not_depend_on_workers(tmp_path):
     file = tmp_path / "c.json"
     ledger = Path(f"{file}l")

@@ -17,6 +17,8 @@ from uav_sim.m100 import SimulatedM100
 from uav_sim.preset import load_preset
 from uav_sim.world import World
 
+pytestmark = pytest.mark.long
+
 VELOCITY = float(0x49)  # control byte: east, north, up [m/s], yaw rate [rad/s], ground frame
 START = 50.0  # [s]
 PARAMETERS = load_laser_parameters()

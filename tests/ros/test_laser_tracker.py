@@ -3,7 +3,7 @@
 
 import pytest
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.long]
 
 SCENARIO = """\
 spawn: [0.0, 0.0, 3.0]

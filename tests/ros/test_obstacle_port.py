@@ -3,7 +3,7 @@
 
 import pytest
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.long]
 
 NODES = ("flight_guard", "nmpc_controller")
 

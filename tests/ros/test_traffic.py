@@ -5,7 +5,7 @@ import pytest
 
 from nmpc_control.errors import ConfigError
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.long]
 
 
 def test_predictions_and_odometry_of_others_become_obstacles(ros):
