@@ -127,11 +127,14 @@ class OtherWays:
         if not best.blocked.any():
             self._owed = 0
             return best
-        is_short_cut = problem.short_cut(field, solution) > 0.0
-        now = at_once or is_short_cut or self._owed
-        if not self._tries or not (now or self._ticks % _PAUSE == 0):
+        if not self._tries:
             return best
-        ways = [self._stay(problem)] if is_short_cut else []
+        short_cut = problem.short_cut(field, solution)
+        now = at_once or short_cut > 0.0 or self._owed
+        if not (now or self._ticks % _PAUSE == 0):
+            return best
+        least = _merit(solution, short_cut)
+        ways = [self._stay(problem)] if short_cut > 0.0 else []
         across = sides(reference[-1] - reference[0])
         for index in self._due(at_once):
             ways.append(self._round(problem, field, reference, across[index]))
@@ -141,9 +144,9 @@ class OtherWays:
             seats = slots.copy()
             instance = problem.instance(seats, [way, reference])
             other = solver.solve(instance, self._guess(solver, problem, way))
-            if other.found and _merit(problem, field, other) < _BETTER * _merit(
-                problem, field, best.solution
-            ):
+            merit = _merit(other, problem.short_cut(field, other))
+            if other.found and merit < _BETTER * least:
+                least = merit
                 best = replace(best, solution=other, slots=seats)
                 self.changes += 1
         return best
@@ -203,13 +206,13 @@ class OtherWays:
         return Guess(states, np.array(inputs))
 
 
-def _merit(problem: Posed, field: ObstacleField, solution: Solution) -> float:
+def _merit(solution: Solution, short_cut: float) -> float:
     """Return the cost of a solution; a short cut costs more than any way is worth.
 
     The L1 penalty is exact about where a way leads, not about which: for a goal far beyond, one
     through a thin body or margin could be cheaper than to wait.
     """
-    return solution.cost + _SHORT_CUT * problem.short_cut(field, solution)
+    return solution.cost + _SHORT_CUT * short_cut
 
 
 @dataclass(frozen=True)

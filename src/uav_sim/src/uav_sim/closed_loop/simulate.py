@@ -30,6 +30,7 @@ from nmpc_control.params import Parameters, load_parameters
 from nmpc_control.scenario import Scenario, load_scenario, scenario_path
 from uav_sim.closed_loop.flight_record import record_of, world_of
 from uav_sim.closed_loop.loop import ClosedLoop, NoFlightError, fly
+from uav_sim.closed_loop.options import seed
 from uav_sim.disturbance import Disturbance, disturbance_names, load_disturbance
 from uav_sim.errors import SimulatorError
 from uav_sim.preset import preset_names
@@ -183,7 +184,7 @@ def _parser() -> argparse.ArgumentParser:
         help=f"{', '.join(disturbance_names())}, or path of a YAML file (default: %(default)s)",
     )
     parser.add_argument(
-        "--seed", type=_seed, default=0, help="of everything random (default: %(default)s)"
+        "--seed", type=seed, default=0, help="of everything random (default: %(default)s)"
     )
     parser.add_argument("--json", type=Path, help="write the metrics to this file")
     parser.add_argument("--quiet", action="store_true", help="no progress, no table")
@@ -194,13 +195,6 @@ def _radius(text: str) -> float:
     value = float(text)
     if not 0.0 <= value <= 5.0:
         raise argparse.ArgumentTypeError(f"got {text}, expected metres in [0, 5]")
-    return value
-
-
-def _seed(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"got {text}, expected a whole number, 0 or more")
     return value
 
 

@@ -25,6 +25,7 @@ from uav_sim.closed_loop.campaign.runner import run
 from uav_sim.closed_loop.campaign.settings import SPREAD, Settings
 from uav_sim.closed_loop.campaign.suites import SUITES
 from uav_sim.closed_loop.campaign.summary import summary, table
+from uav_sim.closed_loop.options import seed
 from uav_sim.disturbance import disturbance_names, load_disturbance
 from uav_sim.errors import SimulatorError
 from uav_sim.preset import preset_names
@@ -124,8 +125,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--suite", required=True, choices=sorted(SUITES), help="what is drawn")
     parser.add_argument("--flights", type=_count, default=20, help="how many (default: 20)")
-    parser.add_argument("--seed", type=_seed, default=0, help="of the campaign (default: 0)")
-    parser.add_argument("--first", type=_seed, default=0, help="number of the first flight")
+    parser.add_argument("--seed", type=seed, default=0, help="of the campaign (default: 0)")
+    parser.add_argument("--first", type=seed, default=0, help="number of the first flight")
     parser.add_argument(
         "--plant",
         default="dji_hil",
@@ -161,13 +162,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--resume", action="store_true", help="keep flights that are finished")
     parser.add_argument("--quiet", action="store_true", help="no progress, no table")
     return parser
-
-
-def _seed(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"got {text}, expected a whole number, 0 or more")
-    return value
 
 
 def _count(text: str) -> int:
