@@ -148,7 +148,9 @@ def test_what_everything_was_set_to_is_in_the_bag(hexagon):
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("name", ["hexagon", "multi_obstacle"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("hexagon", marks=pytest.mark.long), "multi_obstacle"]
+)
 def test_on_the_other_plant_it_is_at_most_half_as_bad_again(name, request, tmp_path):
     flight = fly(tmp_path, name, "--plant", "eth")
     assert flight.status == 0, flight.output
