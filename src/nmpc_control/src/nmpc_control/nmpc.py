@@ -23,6 +23,8 @@ from nmpc_control.state import GRAVITY, POSITION, VELOCITY, Plan, hover_input
 _SOON = 2.0  # [s] ahead in which a plan that goes on makes headway
 _NO_HEADWAY = 0.3  # [m], [m/s]
 _LEAST_PACE = 1.0  # [m/s]
+_BRISK = 1.3  # [1] times the reference's speed is no haste yet
+_HASTE, _MOST_HASTE = 0.05, 0.15  # [s], [m]: at full tilt nothing is left to correct with
 _SLOWER = 0.3  # [m/s] at once, where it is too fast already
 _NAMED = 3  # obstacles in a sentence
 
@@ -138,7 +140,7 @@ class Nmpc:
             reach, paper = avoidance.inflation, True  # Eq. 8 is taken as it stands
         else:
             reach = avoidance.cushion if avoidance.term == "barrier" else 0.0
-            margin += avoidance.allowance + self.tracking_error
+            margin += avoidance.allowance + self.tracking_error + self._haste(x0, x_ref)
         return Posed(
             structure=self.structure,
             times=self.stage_times(t),
@@ -171,6 +173,13 @@ class Nmpc:
             theta[PARTS["speed"]], max(avoidance.pace * fastest, own)
         )
         return theta
+
+    @staticmethod
+    def _haste(x0: np.ndarray, x_ref: np.ndarray) -> float:
+        """Return by how much [m] to keep farther off while flying faster than the reference."""
+        pace = float(np.linalg.norm(x_ref[:, VELOCITY], axis=1).max())
+        excess = float(np.linalg.norm(x0[VELOCITY])) - _BRISK * pace
+        return min(_HASTE * max(0.0, excess), _MOST_HASTE)
 
     @property
     def left_out(self) -> int:
