@@ -9,6 +9,7 @@ import pytest
 from nmpc_control.guides import Turns
 from nmpc_control.nmpc import Nmpc
 from nmpc_control.obstacle import Obstacle
+from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.other_ways import OtherWays
 from nmpc_control.params import load_parameters
 from nmpc_control.state import hover_input, hover_state
@@ -143,3 +144,39 @@ def test_a_dead_end_is_left_for_the_side_that_is_open(nmpc):
     least = min(o.distance(states[:, :3]).min() for o in (BALL, wall))
     assert least > MARGIN
     assert states[-1, 0] > BALL.position[0] + 1.0
+
+
+def posed(nmpc, speed=SPEED, own=0.0):
+    """Return the problem of an aircraft at rest, or at its own speed [m/s], at the origin."""
+    x_ref = np.zeros((nmpc.structure.horizon + 1, 10))
+    x_ref[:, 0] = speed * nmpc.structure.dt * np.arange(len(x_ref))
+    x_ref[:, 2], x_ref[:, 6] = 5.0, speed
+    x0 = hover_state(np.array([0.0, 0.0, 5.0]))
+    x0[6] = own
+    return nmpc._pose(0.0, x0, x_ref, hover_input(), [BALL], None)
+
+
+@pytest.mark.parametrize(
+    ("when", "depth", "counts"),
+    [
+        (0.5, 0.06, True),
+        (0.5, 0.01, False),
+        (3.0, 0.06, False),
+        (3.0, 0.15, True),
+        (5.0, 0.5, False),
+    ],
+)
+def test_a_short_cut_counts_where_it_is_soon_and_more_than_a_touch(nmpc, when, depth, counts):
+    problem = posed(nmpc)
+    found = nmpc.solver.solve(problem.free(problem.x_ref[:, :3]))
+    states = np.tile(problem.x0, (len(problem.times), 1))
+    k = int(round(when / nmpc.structure.dt))
+    states[k, :3] = BALL.position - [0.5 + problem.margin - depth, 0.0, 0.0]
+    cut = problem.short_cut(ObstacleField([BALL]), dataclasses.replace(found, states=states))
+    assert (cut > 0.0) is counts
+
+
+def test_in_haste_it_keeps_farther_off(nmpc):
+    assert posed(nmpc, own=SPEED).margin == posed(nmpc).margin
+    assert posed(nmpc, own=3.3).margin == pytest.approx(posed(nmpc).margin + 0.0675)
+    assert posed(nmpc, own=9.0).margin == pytest.approx(posed(nmpc).margin + 0.15)
