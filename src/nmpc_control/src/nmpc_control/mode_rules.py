@@ -99,6 +99,14 @@ RULES: Tuple[Rule, ...] = (
     ),
     # the operator
     Rule(
+        "leaving",
+        PLANNED,
+        Mode.BRAKING,
+        "the guard was told to end",
+        lambda i, p: i.leaving,
+        "the guard was told to end: it holds on until authority is given back",
+    ),
+    Rule(
         "asked",
         (*AUTOMATIC, Mode.READY, Mode.FAULT),
         Mode.RELEASED,

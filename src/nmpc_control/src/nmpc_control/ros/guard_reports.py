@@ -8,7 +8,6 @@ import math
 import os
 from typing import Callable, Optional, Tuple
 
-import diagnostic_updater
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
 
@@ -16,10 +15,10 @@ from nmpc_control.guard import Guard
 from nmpc_control.guard_data import GuardInputs, GuardOutput
 from nmpc_control.ladder import Rung
 from nmpc_control.mode_inputs import PLANNED, Mode
+from nmpc_control.ros.diagnostics import Diagnostics, Wrapper
 from nmpc_control.state import Goal
 from nmpc_msgs.msg import ControlInput, ControllerStatus, Plan
 
-Wrapper = diagnostic_updater.DiagnosticStatusWrapper
 _ATTENTION = (Mode.BRAKING, Mode.RELEASED, Mode.FAULT)
 LATE_SHARE = 0.02  # [1] of late periods from which on the loop is reported
 OVERLOAD = 1.0  # [1] processes that want a core, per core
@@ -36,17 +35,16 @@ class GuardReports:
         self._status = rospy.Publisher(
             "nmpc/status", ControllerStatus, queue_size=10, tcp_nodelay=True
         )
-        self._updater = diagnostic_updater.Updater()
-        self._updater.setHardwareID("M100")
-        self._updater.add("flight", self._diagnose_flight)
-        self._updater.add("telemetry", self._diagnose_telemetry)
-        self._updater.add("plans", self._diagnose_plans)
-        self._updater.add("loop", self._diagnose_loop)
-        self._updater.add("battery", self._diagnose_battery)
+        self._diagnostics = Diagnostics("M100")
+        self._diagnostics.add("flight", self._diagnose_flight)
+        self._diagnostics.add("telemetry", self._diagnose_telemetry)
+        self._diagnostics.add("plans", self._diagnose_plans)
+        self._diagnostics.add("loop", self._diagnose_loop)
+        self._diagnostics.add("battery", self._diagnose_battery)
 
     def add(self, name: str, diagnose: Callable[[Wrapper], Wrapper]) -> None:
         """Have another entry in /diagnostics."""
-        self._updater.add(name, diagnose)
+        self._diagnostics.add(name, diagnose)
 
     def publish(
         self,
@@ -91,7 +89,7 @@ class GuardReports:
         message.header.stamp = now
         self._status.publish(message)
         self._last = (inputs, output)
-        self._updater.update()
+        self._diagnostics.update()
 
     def _diagnose_flight(self, status: Wrapper) -> Wrapper:
         if self._last is None:
