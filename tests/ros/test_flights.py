@@ -147,9 +147,12 @@ def test_what_everything_was_set_to_is_in_the_bag(hexagon):
     assert recorded["commit"]
 
 
-@pytest.mark.parametrize("name", ["hexagon", "multi_obstacle"])
+@pytest.mark.alone
+@pytest.mark.parametrize(
+    "name", [pytest.param("hexagon", marks=pytest.mark.long), "multi_obstacle"]
+)
 def test_on_the_other_plant_it_is_at_most_half_as_bad_again(name, request, tmp_path):
-    flight = fly(tmp_path, name, "--plant", "eth", "--speed", "1.5")
+    flight = fly(tmp_path, name, "--plant", "eth")
     assert flight.status == 0, flight.output
     assert flight.metrics["collisions"] == 0
     allowed = 1.5 * request.getfixturevalue(name).metrics["average_deviation_m"]

@@ -8,7 +8,9 @@ from typing import Callable, Optional, Sequence, Tuple
 
 import numpy as np
 
+from nmpc_control.approach import Approach
 from nmpc_control.clearance_check import Obstacles
+from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.plan_check import check_flown, check_plan
 from nmpc_control.state import Goal, Plan
@@ -63,6 +65,8 @@ class PlanLadder:
         self.goal = Goal.HOLD
         self.verified = 0  # [1] in a row
         self._verdict = Verdict(Finding.NOT_FOUND, "no plan has come")
+        self._seen: Obstacles = ()  # when the plan was checked
+        self._way: Optional[Approach] = None  # of the plan to these
         self._inside = NOT_INSIDE
         self._came = -math.inf  # [s] the newest plan, verified or not
         self._evades = False  # on a plan that is too near, because braking is worse
@@ -121,6 +125,7 @@ class PlanLadder:
             return
         self.plan, self.goal, self._is_new = plan, goal, True
         self.flown = self._verdict.flown or plan
+        self._seen, self._way = obstacles, self._verdict.way
         self.verified += 1
         if goal is Goal.HOLD:
             self._hold_since = None
@@ -184,6 +189,7 @@ class PlanLadder:
             rung, verdict = Rung.NEW_PLAN, self._verdict
         else:
             rung = Rung.LAST_PLAN
+            unchanged = obstacles is self._seen and isinstance(obstacles, ObstacleField)
             verdict = check_flown(
                 self.flown,
                 t=t,
@@ -191,6 +197,7 @@ class PlanLadder:
                 obstacles=obstacles,
                 params=self.params,
                 before=self._inside,
+                way=self._way if unchanged else None,
             )
             verdict = self._lesser_evil(verdict, brake_clearance)
         verdict = self._flown_on(t, verdict, time_to_stop)

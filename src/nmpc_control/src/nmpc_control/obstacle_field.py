@@ -16,7 +16,7 @@ SHAPES = ("sphere", "cylinder", "box")
 ROUND = 1.0  # [m] least radius of a sphere that stands for a flat surface
 
 
-_ROWS = ("_position", "_velocity", "_stamp", "_growth", "_shape", "_size", "bounding")
+_ROWS = ("_position", "_velocity", "_stamp", "_growth", "_shape", "_size", "bounding", "inscribed")
 
 
 class Spheres(NamedTuple):
@@ -46,6 +46,7 @@ class ObstacleField:
         for row, o in zip(self._size, obstacles):
             row[: len(o.size)] = o.size
         self.bounding = np.array([_bounding(o) for o in obstacles])  # (n,) [m] sphere around each
+        self.inscribed = np.array([_inscribed(o) for o in obstacles])  # (n,) [m] sphere within each
 
     def __len__(self) -> int:
         """Return the number of obstacles n."""
@@ -94,14 +95,23 @@ class ObstacleField:
         return np.clip(self._growth[:, None] * age, 0.0, MAX_GROWTH)
 
     def distances(self, points: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Return the distances (n, M) [m] of points (M, 3) [m] at times (M,) [s] from surfaces."""
+        """Return the distances (n, M) [m] of points from surfaces as far out as they may be then.
+
+        Args:
+            points: (M, 3) [m].
+            times: (M,) [s].
+        """
+        return self.surface_distances(points, times) - self.growth(times)
+
+    def surface_distances(self, points: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Return the same from the surfaces where they are expected."""
         offset = points - self.centres(times)
         result = np.empty(offset.shape[:2])
         for index, shape in enumerate(SHAPES):
             rows = self._shape == index
             if rows.any():
                 result[rows] = surface_distance(offset[rows], shape, self._size[rows, None])
-        return result - self.growth(times)
+        return result
 
     def spheres(self, points: np.ndarray, times: np.ndarray) -> Spheres:
         """Return spheres that touch the surfaces where they are nearest to points (M, 3) [m].
@@ -173,6 +183,12 @@ def _bounding(o: Obstacle) -> float:
     return float(
         np.linalg.norm(o.size) / 2 if o.shape == "box" else np.hypot(o.size[0], o.size[1] / 2)
     )
+
+
+def _inscribed(o: Obstacle) -> float:
+    if o.shape == "sphere":
+        return float(o.size[0])
+    return float(min(o.size) / 2 if o.shape == "box" else min(o.size[0], o.size[1] / 2))
 
 
 def _rows(vectors: List[np.ndarray]) -> np.ndarray:

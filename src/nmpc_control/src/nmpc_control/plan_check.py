@@ -7,6 +7,7 @@ from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
+from nmpc_control.approach import Approach
 from nmpc_control.clearance_check import Obstacles, check_clearance
 from nmpc_control.params import Limits, Vehicle
 from nmpc_control.plan_consistency import as_flown, departure
@@ -75,10 +76,11 @@ def check_flown(
     obstacles: Obstacles,
     params: PlanCheckParameters,
     before: Inside = NOT_INSIDE,
+    way: Optional[Approach] = None,
 ) -> Verdict:
     """Return whether a plan that was verified before may be flown on at time ``t`` [s]."""
     return _check_age(plan, t, params) or check_clearance(
-        plan, t, vehicle, obstacles, params, before
+        plan, t, vehicle, obstacles, params, before, way
     )
 
 

@@ -21,12 +21,13 @@ SAME_TIME = 1e-9  # [s] two times closer than this are one
 def derivative(state: Sequence[float], u: Sequence[float], vehicle: Vehicle) -> Vector:
     """Return the time derivative (10,) of a state (10,) under an input (4,) (paper, Eq. 4)."""
     roll, pitch, yaw, velocity, yaw_rate = state[3], state[4], state[5], state[6:9], state[9]
+    drag, push = vehicle.drag.tolist(), vehicle.disturbance.tolist()
     return (
         *velocity,
         (vehicle.roll.gain * u[1] - roll) / vehicle.roll.time_constant,
         (vehicle.pitch.gain * u[2] - pitch) / vehicle.pitch.time_constant,
         yaw_rate,
-        *_acceleration(roll, pitch, yaw, velocity, u[0], vehicle),
+        *_slope(_lift(roll, pitch, yaw, u[0]), velocity, drag, push),
         (vehicle.yaw_rate.gain * u[3] - yaw_rate) / vehicle.yaw_rate.time_constant,
     )
 
@@ -48,14 +49,16 @@ def step(state: Sequence[float], u: Sequence[float], dt: float, vehicle: Vehicle
         )
 
     middle, end = attitude(half), attitude(dt)
+    drag, push = vehicle.drag.tolist(), vehicle.disturbance.tolist()
+    lift = _lift(*middle, thrust)  # there the slope is taken twice
     v1 = (vx, vy, vz)
-    a1 = _acceleration(roll, pitch, yaw, v1, thrust, vehicle)
+    a1 = _slope(_lift(roll, pitch, yaw, thrust), v1, drag, push)
     v2 = _move(v1, a1, half)
-    a2 = _acceleration(*middle, v2, thrust, vehicle)
+    a2 = _slope(lift, v2, drag, push)
     v3 = _move(v1, a2, half)
-    a3 = _acceleration(*middle, v3, thrust, vehicle)
+    a3 = _slope(lift, v3, drag, push)
     v4 = _move(v1, a3, dt)
-    a4 = _acceleration(*end, v4, thrust, vehicle)
+    a4 = _slope(_lift(*end, thrust), v4, drag, push)
     return (
         *_move((px, py, pz), _mean_slope(v1, v2, v3, v4), dt),
         *end,
@@ -117,21 +120,23 @@ def _lag_integral(angle: float, rate: float, reference: float, t: float, lag: La
     )
 
 
-def _acceleration(
-    roll: float,
-    pitch: float,
-    yaw: float,
-    velocity: Sequence[float],
-    thrust: float,
-    vehicle: Vehicle,
-) -> Vector:
-    drag, push = vehicle.drag.tolist(), vehicle.disturbance.tolist()
+def _lift(roll: float, pitch: float, yaw: float, thrust: float) -> Vector:
+    """Return the acceleration (3,) [m/s^2] by thrust and gravity, world frame."""
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     cy, sy = math.cos(yaw), math.sin(yaw)
     return (
-        thrust * (cr * sp * cy + sr * sy) - drag[0] * velocity[0] + push[0],
-        thrust * (cr * sp * sy - sr * cy) - drag[1] * velocity[1] + push[1],
-        thrust * cr * cp - GRAVITY - drag[2] * velocity[2] + push[2],
+        thrust * (cr * sp * cy + sr * sy),
+        thrust * (cr * sp * sy - sr * cy),
+        thrust * cr * cp - GRAVITY,
+    )
+
+
+def _slope(lift: Vector, velocity: Sequence[float], drag: Vector, push: Vector) -> Vector:
+    """Return the time derivative (3,) [m/s^2] of a velocity (3,) [m/s]."""
+    return (
+        lift[0] - drag[0] * velocity[0] + push[0],
+        lift[1] - drag[1] * velocity[1] + push[1],
+        lift[2] - drag[2] * velocity[2] + push[2],
     )
 
 

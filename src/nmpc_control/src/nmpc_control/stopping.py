@@ -13,8 +13,8 @@ from typing import NamedTuple, Optional
 
 import numpy as np
 
+from nmpc_control.approach import approach, is_clear_of
 from nmpc_control.braking import MADE_UP, BrakeParameters
-from nmpc_control.clearance_check import Approach, approach
 from nmpc_control.obstacle_field import ObstacleField
 from nmpc_control.params import Vehicle
 from nmpc_control.state import GRAVITY, PITCH, POSITION, ROLL, VELOCITY, YAW
@@ -137,9 +137,11 @@ def shortfall(
         room: [m] by which the way must fit even if it were longer.
     """
     way = Way(way.start, way.direction, way.speed, way.reaction, way.braking + room)
-    near = _along(way, way.duration, t, obstacles, radius, margin)
-    if not near.ids:
+    after = _instants(way, way.duration)
+    path = way.points(after), t + after, t, obstacles, radius, margin
+    if is_clear_of(*path):
         return None
+    near = approach(*path)
     limit = np.minimum(margin, near.grown[:, :1] - NEARER)
     too_near = near.grown < limit
     if not too_near.any():
@@ -154,16 +156,15 @@ def clearance_of(
     way: Way, horizon: float, t: float, obstacles: ObstacleField, radius: float
 ) -> float:
     """Return the least clearance [m] over ``horizon`` [s] of a stop, and of staying there."""
-    near = _along(way, max(horizon, way.duration), t, obstacles, radius, 0.0)
+    after = _instants(way, max(horizon, way.duration))
+    near = approach(way.points(after), t + after, t, obstacles, radius, 0.0)
     return float(near.grown.min(initial=math.inf))
 
 
-def _along(
-    way: Way, duration: float, t: float, obstacles: ObstacleField, radius: float, reach: float
-) -> Approach:
+def _instants(way: Way, duration: float) -> np.ndarray:
+    """Return times (M,) [s] after the start at which the way is looked at."""
     count = max(2, math.ceil(max(way.needed / SPACING, duration / 0.1)) + 1)
-    after = np.linspace(0.0, duration, count)
-    return approach(way.points(after), t + after, t, obstacles, radius, reach)
+    return np.linspace(0.0, duration, count)
 
 
 def _push(state: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Mapping, Optional
 
+from nmpc_control.approach import Approach
 from nmpc_control.state import Plan
 
 
@@ -82,6 +83,7 @@ class Verdict:
     speed: float = 0.0  # [m/s] of the plan at that place
     inside: Optional[Inside] = None  # now; None where that was not looked at
     conflict: float = math.inf  # [s] when it is nearer than the minimum for the first time
+    way: Optional[Approach] = None  # to the obstacles, over the rest of the plan
 
     @property
     def ok(self) -> bool:
