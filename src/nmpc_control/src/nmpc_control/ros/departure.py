@@ -10,6 +10,7 @@ import rospy
 from nmpc_control.ros.dji_services import DjiServices
 
 PATIENCE = 12.0  # [s] wall time for authority to be given back; roslaunch gives 15 before SIGTERM
+BRAKE_FIRST = 0.1  # [s] wall time: some setpoints that brake have left by then
 PAUSE = 0.5  # [s] between attempts
 STANDSTILL = 1.0  # [s] wall time in which a tick must come
 
@@ -57,6 +58,7 @@ class Departure:
         self._ended.wait(PAUSE)
 
     def _give_back(self) -> None:
+        time.sleep(BRAKE_FIRST)
         while self._services.may_hold_authority and not self.is_over:
             _, sentence = self._services.release_now()
             rospy.logwarn(f"shutting down: {sentence}")

@@ -149,6 +149,7 @@ class GuardNode:
             return
         t = max(now.to_sec(), self._t)  # a small step back: time stands still until it is caught up
         self._t = t
+        begun = time.perf_counter()
         question = self._next_question()
         request = question.request if question else None
         steady = time.monotonic() if self._has_steady else None  # simulated time is steady itself
@@ -163,13 +164,15 @@ class GuardNode:
             output = self.guard.give_way(t, inputs.telemetry, error)
         if output.axes is not None and not last_request:
             self._setpoint.publish(Joy(header=Header(stamp=now), axes=output.axes))
+        duration = time.perf_counter() - begun
         self._act(output)
         if question:
             question.answer = output.answer or (False, output.reason)
             question.answered.set()
             rospy.loginfo(f"{question.request.value}: {question.answer[1]}")
         obstacle_age = self._listener.obstacles.age(t)
-        self._reports.publish(now, inputs, output, self._listener.last_plan, obstacle_age)
+        last_plan = self._listener.last_plan
+        self._reports.publish(now, inputs, output, last_plan, obstacle_age, duration)
 
     def _act(self, output: GuardOutput) -> None:
         if Action.RELEASE_AUTHORITY in output.actions:

@@ -21,6 +21,7 @@ from nmpc_msgs.msg import ControlInput, ControllerStatus, Plan
 
 _ATTENTION = (Mode.BRAKING, Mode.RELEASED, Mode.FAULT)
 LATE_SHARE = 0.02  # [1] of late periods from which on the loop is reported
+LONG_WAY = 0.3  # [s] from telemetry to the plan made of it, from which on it is reported
 OVERLOAD = 1.0  # [1] processes that want a core, per core
 _SILENT = ControlInput(math.nan, math.nan, math.nan, math.nan)
 
@@ -53,8 +54,12 @@ class GuardReports:
         output: GuardOutput,
         last_plan: Plan,
         obstacle_age: float,
+        tick_time: float,
     ) -> None:
-        """Publish one tick; ``last_plan`` is the newest plan message, an empty one without."""
+        """Publish one tick, which has taken ``tick_time`` [s].
+
+        ``last_plan`` is the newest plan message, an empty one without.
+        """
         guard, telemetry = self._guard, inputs.telemetry
         ages = (telemetry.position_age, telemetry.velocity_age, telemetry.attitude_age)
         message = ControllerStatus(
@@ -83,6 +88,9 @@ class GuardReports:
             deadline_misses=last_plan.deadline_misses,
             predicted_clearance=output.clearance,
             battery=telemetry.battery,
+            tick_time=tick_time,
+            clock_offset=guard.link.offset,
+            link_delay=guard.link.delay,
             loop_rate=guard.situation.loop.rate,
             loop_jitter=guard.situation.loop.jitter,
         )
@@ -138,6 +146,14 @@ class GuardReports:
         is_fresh = age <= self._guard.params.plan_check.timeout
         level = DiagnosticStatus.OK if is_fresh else DiagnosticStatus.WARN
         status.summary(level, f"last verified plan {age:.2f} s ago")
+        link = self._guard.link
+        if link.finding:
+            status.summary(DiagnosticStatus.ERROR, link.finding)
+        elif link.delay > LONG_WAY:
+            words = f"from telemetry to plan it takes up to {1e3 * link.delay:.0f} ms"
+            status.summary(DiagnosticStatus.WARN, words)
+        status.add("controller's clock ahead [ms]", f"{1e3 * link.offset:.1f}")
+        status.add("telemetry to plan [ms]", f"{1e3 * link.delay:.0f}")
         status.add("received", str(ladder.received))
         status.add("rejected", str(ladder.rejected))
         return status

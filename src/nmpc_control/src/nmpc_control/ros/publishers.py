@@ -35,6 +35,7 @@ from nmpc_control.ros.conversions import (
     odometry_to_msg,
     plan_to_msg,
     prediction_to_msg,
+    refusal_to_msg,
 )
 from nmpc_control.ros.diagnostics import Diagnostics, Wrapper
 from nmpc_control.rotations import quaternion_from_rpy
@@ -72,10 +73,12 @@ class Publishers:
         self._diagnostics = Diagnostics("M100")
         self._diagnostics.add("solver", self._diagnose_solver)
 
-    def step(self, now: rospy.Time, step: Step, misses: int) -> None:
-        """Publish everything that one control step produced."""
+    def step(
+        self, now: rospy.Time, step: Step, misses: int, state_stamp: float, tick_time: float
+    ) -> None:
+        """Publish everything that one control step produced; arguments as of ``plan_to_msg``."""
         header = Header(stamp=now, frame_id=self.frame_id)
-        self._plan.publish(plan_to_msg(step, header, misses))
+        self._plan.publish(plan_to_msg(step, header, misses, state_stamp, tick_time))
         self._steps += 1
         if self._steps % 2 == 0 and step.is_promise:
             self._prediction.publish(prediction_to_msg(step, header))
@@ -90,6 +93,11 @@ class Publishers:
         self._transforms.sendTransform(
             TransformStamped(header, self.base_frame, Transform(translation, pose.orientation))
         )
+
+    def no_plan(self, now: rospy.Time, sentence: str, state_stamp: float) -> None:
+        """Tell the guard why there is no plan."""
+        header = Header(stamp=now, frame_id=self.frame_id)
+        self._plan.publish(refusal_to_msg(sentence, header, state_stamp))
 
     def add_diagnostics(self, name: str, diagnose: Callable[[Wrapper], Wrapper]) -> None:
         """Have another entry in /diagnostics."""
