@@ -88,6 +88,11 @@ class ClosedLoop:
         """Simulated time [s]."""
         return self.aircraft.t
 
+    @property
+    def controller_time(self) -> float:
+        """Simulated time [s] by the controller's clock."""
+        return self.t
+
     def step(self) -> None:
         """Advance by one step: telemetry, solve when due, guard when due, aircraft."""
         for packet in self.aircraft.step():
@@ -173,11 +178,13 @@ class ClosedLoop:
         elif action is Action.SET_REFERENCE:
             self.aircraft.set_local_position_reference()
         elif action is Action.HOLD:
-            x = self.controller.estimator.estimate(self.t).vector
+            x = self.controller.estimator.estimate(self.controller_time).vector
             self.controller.itinerary.hold(x[:3], x[5])
         elif action is Action.RETURN:
-            x = self.controller.estimator.estimate(self.t).vector
-            self.controller.itinerary.go_to(self.t, x[:3], x[5], np.array(output.target), x[5])
+            x = self.controller.estimator.estimate(self.controller_time).vector
+            self.controller.itinerary.go_to(
+                self.controller_time, x[:3], x[5], np.array(output.target), x[5]
+            )
 
 
 def fly(
@@ -211,14 +218,14 @@ def fly(
         if loop.t > _START_TIMEOUT:
             raise NoFlightError(f"automatic flight did not begin: {loop.log.outputs[-1][1].reason}")
     itinerary = loop.controller.itinerary
-    x = loop.controller.estimator.estimate(loop.t).vector
+    x = loop.controller.estimator.estimate(loop.controller_time).vector
     if approach:
-        itinerary.fly(loop.t, x[:3], x[5], scenario.trajectory)
+        itinerary.fly(loop.controller_time, x[:3], x[5], scenario.trajectory)
     else:
-        itinerary.begin(loop.t, scenario.trajectory)
+        itinerary.begin(loop.controller_time, scenario.trajectory)
     while itinerary.outcome is None and loop.guard.mode in STREAMING:
         loop.step()
-        on_progress(itinerary.progress(loop.t))
+        on_progress(itinerary.progress(loop.controller_time))
     end = loop.t + _AFTER_ARRIVAL
     while loop.t < end:
         loop.step()
