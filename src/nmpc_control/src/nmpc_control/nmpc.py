@@ -22,6 +22,10 @@ from nmpc_control.state import GRAVITY, POSITION, VELOCITY, Plan, hover_input
 
 _SOON = 2.0  # [s] ahead in which a plan that goes on makes headway
 _NO_HEADWAY = 0.3  # [m], [m/s]
+_LEAST_PACE = 1.0  # [m/s]
+_BRISK = 1.3  # [1] times the reference's speed is no haste yet
+_HASTE, _MOST_HASTE = 0.05, 0.15  # [s], [m]: at full tilt nothing is left to correct with
+_SLOWER = 0.3  # [m/s] at once, where it is too fast already
 _NAMED = 3  # obstacles in a sentence
 
 
@@ -130,12 +134,13 @@ class Nmpc:
     ) -> Posed:
         """Return the problem without choice of slots; arguments as of ``solve``."""
         avoidance = self.parameters.avoidance
+        known = obstacles if avoidance.enabled else ()
         margin, paper = self.parameters.vehicle.radius + avoidance.safety_distance, False
         if avoidance.term == "potential":
             reach, paper = avoidance.inflation, True  # Eq. 8 is taken as it stands
         else:
             reach = avoidance.cushion if avoidance.term == "barrier" else 0.0
-            margin += avoidance.allowance + self.tracking_error
+            margin += avoidance.allowance + self.tracking_error + self._haste(x0, x_ref)
         return Posed(
             structure=self.structure,
             times=self.stage_times(t),
@@ -143,12 +148,38 @@ class Nmpc:
             u_before=u_before,
             x_ref=x_ref,
             u_ref=hover_input(GRAVITY) if u_ref is None else u_ref,
-            theta=self._theta,
-            obstacles=obstacles if avoidance.enabled else (),
+            theta=self._paced(x0, x_ref, known),
+            obstacles=known,
             margin=margin,
             reach=reach,
             between=not paper,
         )
+
+    def _paced(
+        self, x0: np.ndarray, x_ref: np.ndarray, obstacles: Sequence[Obstacle]
+    ) -> np.ndarray:
+        """Return theta with the speed bounded by that of the reference, or of what comes.
+
+        Who is late or aside would else sprint among obstacles, and have no room to correct.
+        """
+        avoidance = self.parameters.avoidance
+        if not (avoidance.pace and obstacles) or avoidance.term == "potential":
+            return self._theta
+        fastest = float(np.linalg.norm(x_ref[:, VELOCITY], axis=1).max())
+        fastest = max(fastest, self._slots.field_of(obstacles).fastest, _LEAST_PACE)
+        own = float(np.linalg.norm(x0[VELOCITY])) - _SLOWER
+        theta = self._theta.copy()
+        theta[PARTS["speed"]] = np.minimum(
+            theta[PARTS["speed"]], max(avoidance.pace * fastest, own)
+        )
+        return theta
+
+    @staticmethod
+    def _haste(x0: np.ndarray, x_ref: np.ndarray) -> float:
+        """Return by how much [m] to keep farther off while flying faster than the reference."""
+        pace = float(np.linalg.norm(x_ref[:, VELOCITY], axis=1).max())
+        excess = float(np.linalg.norm(x0[VELOCITY])) - _BRISK * pace
+        return min(_HASTE * max(0.0, excess), _MOST_HASTE)
 
     @property
     def left_out(self) -> int:

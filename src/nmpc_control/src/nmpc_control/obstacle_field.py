@@ -81,6 +81,11 @@ class ObstacleField:
         result[self._paths] = True
         return result
 
+    @property
+    def fastest(self) -> float:
+        """The greatest speed [m/s] of any; 0 without obstacles."""
+        return float(np.linalg.norm(self._velocity, axis=1).max(initial=0.0))
+
     def centres(self, times: np.ndarray) -> np.ndarray:
         """Return the centres (n, M, 3) [m] at times (M,) [s]."""
         age = times - self._stamp[:, None]

@@ -24,7 +24,9 @@ from nmpc_control.state import NU, NX, POSITION, VELOCITY
 _PAUSE = 3  # ticks from one try to the next while there is a solution
 _AT_ONCE = 3  # sides tried in a tick without one; the others one a tick, for a tick has to end
 _BETTER = 0.95  # of its cost: what is dearer than this is no reason to change
-_SHORT_CUT, _TOUCH = 1e6, 0.1  # [1/m] of entering margins by more than this many metres
+_SHORT_CUT = 1e6  # [1/m] of entering margins by more than a touch
+_TOUCH_SOON, _SOON, _TOUCH = 0.02, 2.0, 0.1  # [m] of a touch now, and from these [s] ahead on
+_AHEAD = 4.0  # [s] farther ahead no margin is looked at
 _BODIES = 8  # times that a way is pushed on where a body turns out to be wider
 _IN_TIME = 4  # stages of sideways motion that a way may lack at its start
 _STOPPING = 0.7  # [s] time constant of the stop that is tried where every way leads through
@@ -62,17 +64,16 @@ class Posed:
     def short_cut(self, field: ObstacleField, solution: Solution) -> float:
         """Return how much deeper [m] a solution leads into margins than the aircraft is now.
 
-        On the true bodies, also halfway between the stages; a touch is none.
+        On the true bodies, also halfway between the stages. A touch is none, less so where it would
+        be soon; nor is what is far ahead: a way is found by then.
         """
-        stages = solution.states[:, POSITION]
-        middle = (stages[1:] + stages[:-1]) / 2.0
-        half = (self.times[1:] + self.times[:-1]) / 2.0
-        least = min(
-            field.distances(stages, self.times).min(initial=np.inf),
-            field.distances(middle, half).min(initial=np.inf),
-        )
-        now = field.distances(stages[:1], self.times[:1]).min(initial=np.inf)
-        return max(0.0, min(self.margin, now) - least - _TOUCH)
+        N = min(int(_AHEAD / self.structure.dt), self.structure.horizon)
+        stages, times = solution.states[: N + 1, POSITION], self.times[: N + 1]
+        points = np.concatenate([stages, (stages[1:] + stages[:-1]) / 2.0])
+        when = np.concatenate([times, (times[1:] + times[:-1]) / 2.0])
+        least = field.distances(points, when).min(axis=0, initial=np.inf)
+        touch = np.interp(when - times[0], [0.0, _SOON], [_TOUCH_SOON, _TOUCH])
+        return max(0.0, float((min(self.margin, least[0]) - least - touch).max()))
 
     def free(self, path: np.ndarray) -> Instance:
         """Return the problem of following a path (N + 1, 3) [m] without obstacles."""

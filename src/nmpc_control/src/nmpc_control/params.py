@@ -135,6 +135,7 @@ class Avoidance:
     cushion: float = _non_negative()  # [m] the same of the barrier
     cushion_gain: float = _non_negative()  # of the barrier's potential
     weight: float = _positive()  # [1/m] of the L1 penalty on Eq. 7
+    pace: float = field(metadata={"min": 0.0})  # [1] times the reference's speed at most; 0: any
     guides: int = field(metadata={"min": 0, "max": 8})  # other ways round tried in one tick
     allowance: float = _non_negative()  # [m] added to the margin of Eq. 7: least tracking error
 

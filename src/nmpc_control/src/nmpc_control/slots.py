@@ -28,7 +28,7 @@ class Slots:
         self.renewed: List[int] = []  # slots that were given to another obstacle last
         self.field = ObstacleField(())
         self.occupants: List[Optional[str]] = [None] * count
-        self._field_of = FieldOf()
+        self.field_of = FieldOf()
 
     def fill(
         self,
@@ -55,7 +55,7 @@ class Slots:
         Raises:
             ProblemError: an obstacle that is nowhere or has no size.
         """
-        self.field = self._field_of(obstacles)
+        self.field = self.field_of(obstacles)
         if self.field.unusable:
             raise ProblemError(
                 f"obstacle {self.field.unusable[0]}: expected numbers that are finite, and a size "
