@@ -5,16 +5,18 @@ MAKEFLAGS += --no-print-directory
 export SCENARIO ?= multi_obstacle
 export PLANT ?= dji_hil
 export SPEED ?= 1.0
+SOAK_MINUTES ?= 10
 RVIZ ?=
 in_workspace := . devel/setup.bash &&
 single_thread := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 two_workers := -n 2 --dist loadscope
 
-.PHONY: help build fly bench test test-long lint clean
+.PHONY: help build fly bench soak test test-long lint clean
 
 help:
 	@echo "make fly [SCENARIO=multi_obstacle] [PLANT=dji_hil] [SPEED=1.0] [RVIZ=1]   fly in the simulator, record, report"
 	@echo "make bench [BENCH_ARGS=...]   performance tables, build/bench.json, figures; ten minutes (--quick: one)"
+	@echo "make soak [SOAK_MINUTES=10]   a long flight on a busy machine: jitter, memory, markers; build/soak.json"
 	@echo "make test [PYTEST_ARGS=...]   everything that continuous integration runs"
 	@echo "make test-long   the tests that take too long for it: traffic, floods of obstacles, motion capture, laser"
 	@echo "make build   system packages, Python packages and the workspace, as far as they are missing"
@@ -31,6 +33,9 @@ fly: build
 
 bench: build
 	@$(in_workspace) $(single_thread) .venv/bin/python3 -m uav_sim.closed_loop.bench $(BENCH_ARGS)
+
+soak: build
+	@$(in_workspace) $(single_thread) .venv/bin/python3 -m uav_sim.closed_loop.soak --minutes $(SOAK_MINUTES)
 
 test: lint
 	@$(single_thread) .setup/python38.sh

@@ -12,6 +12,7 @@ setup(
             "uav_sim.closed_loop.bench",
             "uav_sim.closed_loop.campaign",
             "uav_sim.closed_loop.replay",
+            "uav_sim.closed_loop.soak",
             "uav_sim.faults",
             "uav_sim.ros",
         ],

@@ -151,18 +151,7 @@ def pilot_takes_over():
     return seen
 
 
-def guard_is_interrupted():
-    """Hover, end the guard as Ctrl-C does, and find that authority was given back."""
-    client = Client()
-    client.hover()
-    kill("/flight_guard", signal.SIGINT)
-    rospy.sleep(2.0)
-    count = len(client.setpoints)
-    rospy.sleep(0.5)
-    return {"task": client.land_task_ack(), "silent": len(client.setpoints) == count}
-
-
-SITUATIONS = {f.__name__: f for f in (controller_dies, pilot_takes_over, guard_is_interrupted)}
+SITUATIONS = {f.__name__: f for f in (controller_dies, pilot_takes_over)}
 
 if __name__ == "__main__":
     sys.stdout.write(json.dumps(SITUATIONS[sys.argv[1]]()) + "\n")

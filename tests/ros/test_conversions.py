@@ -26,6 +26,7 @@ from nmpc_control.ros.conversions import (
     plan_from_msg,
     plan_to_msg,
     prediction_to_msg,
+    refusal_to_msg,
 )
 from nmpc_control.ros.obstacle_wire import WireError, read_head, read_obstacles
 from nmpc_control.rotations import rpy_from_quaternion
@@ -69,7 +70,7 @@ def over_the_wire(message):
 
 
 def test_a_plan_comes_back_the_same(step):
-    message = over_the_wire(plan_to_msg(step, HEADER, 4))
+    message = over_the_wire(plan_to_msg(step, HEADER, 4, 12.25, 0.003))
     plan, goal = plan_from_msg(message, "world")
     assert goal is Goal.TRAJECTORY
     np.testing.assert_array_equal(plan.states, step.plan.states)
@@ -90,6 +91,15 @@ def test_a_plan_comes_back_the_same(step):
         np.reshape(message.references, (4, 3)), step.stage_references[:, :3]
     )
     assert (message.reference_time, message.deadline_misses) == (3.5, 4)
+    assert (plan.state_t, message.tick_time) == (12.25, 0.003)
+
+
+def test_why_there_is_no_plan_can_be_read_as_one_that_is_not_found():
+    message = over_the_wire(refusal_to_msg("the state is 0.42 s old", HEADER, 12.25))
+    plan, _ = plan_from_msg(message, "world")
+    assert (plan.found, plan.status, plan.state_t) == (False, "the state is 0.42 s old", 12.25)
+    unknown, _ = plan_from_msg(over_the_wire(refusal_to_msg("", HEADER, math.nan)), "world")
+    assert math.isnan(unknown.state_t)
 
 
 @pytest.mark.parametrize(
@@ -105,7 +115,7 @@ def test_a_plan_comes_back_the_same(step):
     ],
 )
 def test_plans_that_cannot_be_right_are_refused(step, change, words):
-    message = plan_to_msg(step, HEADER, 0)
+    message = plan_to_msg(step, HEADER, 0, math.nan, 0.0)
     for name, value in change.items():
         setattr(message, name, value)
     with pytest.raises(MessageError, match=words):

@@ -24,7 +24,7 @@ class Aircraft:
         self.done = threading.Semaphore(0)
         self.gate = threading.Event()
         self.gate.set()
-        monkeypatch.setattr(dji_services, "_call", self._call)
+        monkeypatch.setattr(dji_services.DjiServices, "_call", lambda _, action: self._call(action))
         monkeypatch.setattr(dji_services, "PAUSE", 0.01)
         self.services = DjiServices(self.authority.append, self._fail)
 

@@ -66,14 +66,6 @@ def test_the_pilot_silences_the_stream_and_only_a_new_start_resumes(flight):
     assert {"pilot", "pilot_gave_back", "asked", "recovered", "goal"} <= set(seen["codes"])
 
 
-def test_ctrl_c_in_the_air_gives_authority_back(flight):
-    seen = flight.run_json("guard_client.py", "guard_is_interrupted", timeout=120)
-    assert seen == {"task": 1, "silent": True}
-    log = flight.output()
-    assert "shutting down: release authority: done" in log
-    assert "Traceback" not in log
-
-
 def test_thrust_is_not_commanded_through_a_map_of_no_airframe(monkeypatch):
     pytest.importorskip("nmpc_msgs", reason="the workspace is not built or not sourced")
     from nmpc_control.ros import guard_node

@@ -50,6 +50,10 @@ TABLE = [
     (Mode.RELEASED, {"request": Request.START, "sticks": 0.5}, Mode.RELEASED, ""),
     (Mode.RELEASED, {}, Mode.RELEASED, ""),
     (Mode.FAULT, {}, Mode.FAULT, ""),
+    # the guard is told to end
+    (Mode.FLYING, {**IN_AIR, "leaving": True}, Mode.BRAKING, "until authority is given back"),
+    (Mode.HOVERING, {**IN_AIR, "leaving": True}, Mode.BRAKING, "told to end"),
+    (Mode.BRAKING, {**IN_AIR, "leaving": True}, Mode.BRAKING, ""),
     # take-off
     (Mode.TAKING_OFF, ON_GROUND, Mode.TAKING_OFF, ""),
     (Mode.TAKING_OFF, SETTLED, Mode.HOVERING, "done"),

@@ -129,6 +129,13 @@ class Controller:
             engaged=engaged,
         )
 
+    def why_not(self, t: float) -> str:
+        """Return why ``step`` has no plan for ``t`` [s]."""
+        estimate = self.estimator.estimate(t)
+        if estimate is None:
+            return "the state is not complete"
+        return f"the state is {estimate.age:.2f} s old by the controller's clock"
+
     def take_up(self, t: float) -> Tuple[bool, str]:
         """Go on with the goal that the pilot interrupted; return whether, and a sentence."""
         estimate = self.estimator.estimate(t)

@@ -14,6 +14,7 @@ from nmpc_control.dji import FlightStatus
 from nmpc_control.guard_data import Action, Command, GuardInputs, GuardOutput
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.ladder import PlanLadder, Rung
+from nmpc_control.link_watch import LinkWatch
 from nmpc_control.mode_conditions import battery_is_low, pilot_has_control
 from nmpc_control.mode_inputs import AUTOMATIC, PLANNED, STREAMING, Mode, ModeInputs, Request
 from nmpc_control.obstacle_field import FieldOf, ObstacleField
@@ -24,7 +25,7 @@ from nmpc_control.sent_inputs import IN_FORCE, SentInputs
 from nmpc_control.setpoints import Setpoints
 from nmpc_control.situation import Situation
 from nmpc_control.state import POSITION, VELOCITY, hover_input
-from nmpc_control.verdict import Verdict
+from nmpc_control.verdict import Finding, Verdict
 
 MAX_TICK = 0.1  # [s] a longer pause between ticks counts as this
 FORGOTTEN = 0.5  # [s] after its effect an input no longer shows in the attitude
@@ -46,6 +47,7 @@ class Guard:
         self._setpoints = Setpoints(params, vehicle)
         self._sent = SentInputs(vehicle)
         self.ladder = PlanLadder(params.plan_check, params.hold_timeout, vehicle, limits)
+        self.link = LinkWatch(params.link)
         self._brake = Brake(vehicle, limits, params.brake)
         self.override = Override(
             params.stopping, params.brake, vehicle, 1.0 / params.rate, params.plan_check
@@ -126,6 +128,7 @@ class Guard:
         self._sent.forget()
         self._disturbance.reset()
         self.ladder.forget()
+        self.link.forget()
         self.override.forget()
 
     def _learn(self, i: GuardInputs) -> None:
@@ -147,7 +150,12 @@ class Guard:
     ) -> None:
         if i.plan_error:
             self.ladder.refuse(i.plan_error)
-        if i.plan is not None:
+        if i.plan is None:
+            return
+        self.link.take(i.t, i.plan)
+        if self.link.finding:
+            self.ladder.refuse(self.link.finding, Finding.CLOCK)
+        else:
             state = None if i.estimate is None else i.estimate.vector
             self.ladder.take(
                 i.plan,

@@ -31,6 +31,7 @@ class GuardInbox:
         self.authority = False  # as far as the last answer of dji_sdk tells
         self.failure = ""  # how a service call failed, until the next tick
         self.request: Optional[Request] = None
+        self.leaving = False  # the guard was told to end
         self.needs_gps = True  # the position comes from GPS
         self.yaw_disagreement = math.nan  # [rad] motion capture's less dji_sdk's
         self.rejected: Dict[str, int] = Counter()  # values that are not finite, per source
@@ -105,6 +106,7 @@ class GuardInbox:
             battery_age=self._age("battery", self._battery[0], t, steady),
             battery=self._battery[1],
             authority=self.authority,
+            leaving=self.leaving,
             failure=self.failure,
             request=self.request,
         )

@@ -8,6 +8,7 @@ from typing import Optional
 from nmpc_control.braking import BrakeParameters
 from nmpc_control.config import config_directory, from_dict, load_yaml
 from nmpc_control.dji import SetpointLimits, Switch
+from nmpc_control.link_watch import LinkParameters
 from nmpc_control.mode_inputs import ModeParameters
 from nmpc_control.params import Disturbance
 from nmpc_control.stopping import StoppingParameters
@@ -33,6 +34,7 @@ class GuardParameters:
     setpoint_limits: SetpointLimits = field()
     modes: ModeParameters = field()
     plan_check: PlanCheckParameters = field()
+    link: LinkParameters = field()
     brake: BrakeParameters = field()
     stopping: StoppingParameters = field()
     disturbance: Disturbance = field()

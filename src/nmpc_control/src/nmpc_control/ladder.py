@@ -130,12 +130,12 @@ class PlanLadder:
         if goal is Goal.HOLD:
             self._hold_since = None
 
-    def refuse(self, sentence: str) -> None:
-        """Count a plan that could not even be read."""
+    def refuse(self, sentence: str, finding: Finding = Finding.SHAPE) -> None:
+        """Count a plan that could not even be read, or whose times mean nothing."""
         self.received += 1
         self.rejected += 1
         self.verified = 0
-        self._verdict = Verdict(Finding.SHAPE, sentence)
+        self._verdict = Verdict(finding, sentence)
 
     def expect_hold(self, t: float) -> None:
         """Accept plans towards a goal only for ``hold_timeout`` more, until one holds position."""

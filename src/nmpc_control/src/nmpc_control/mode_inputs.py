@@ -125,6 +125,7 @@ class ModeInputs:
     effectless_time: float = 0.0  # [s] of commands without effect, in this mode
     effectless_total: float = 0.0  # [s] of them since the last that had effect
     authority: bool = False
+    leaving: bool = False  # the guard was told to end, and gives authority back
     failure: str = ""  # a service call of this mode failed: how
     request: Optional[Request] = None
     time_in_mode: float = 0.0  # [s]

@@ -73,6 +73,14 @@ RULES: Tuple[Rule, ...] = (
         "the tilt has been beyond its limit for {i.tilt_time:.1f} s",
     ),
     Rule(
+        "leaving",
+        PLANNED,
+        Mode.BRAKING,
+        "the guard was told to end",
+        lambda i, p: i.leaving,
+        "the guard was told to end: it holds on until authority is given back",
+    ),
+    Rule(
         "authority_lost",
         PLANNED,
         Mode.RELEASED,

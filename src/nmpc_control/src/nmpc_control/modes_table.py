@@ -43,12 +43,37 @@ RULES_HEAD = """
 |---|---|---|---|---|---|
 """
 
+END = """
+## When the guard itself is ended in the air
+
+Ctrl-C (SIGINT), SIGTERM and `rosnode kill`: it brakes and holds as in `braking`, reason code
+`leaving`, and meanwhile gives authority back to dji_sdk. Only when that is acknowledged, or after
+12 s without an answer, the stream stops; a last status `released` follows, and the process ends.
+Then DJI's own control holds the aircraft, and the pilot's sticks act. On the ground it ends at
+once. `roslaunch` sends SIGINT, after 15 s SIGTERM, 2 s later SIGKILL: the 12 s fit in.
+
+A second signal ends it at once. That, SIGKILL, a crash or the loss of power stop the stream
+within one period; authority is not given back, and nothing starts the guard again. What an M100
+does then is documented nowhere: the pilot takes over with the switch. The simulator keeps the last
+setpoint for its `cmd_timeout` (0.5 s, an assumption), then levels, brakes and, with good GPS,
+holds position; the sticks act. A guard that is started anew waits, and sends nothing before
+`start`.
+
+A guard that is stopped for a while (SIGSTOP) goes on from what it hears next.
+
+The controller may end in any way at any time: the guard flies the last verified plan, then brakes
+and holds; a controller that a person starts again is flown once its plans have been usable for
+`recover_time`. The ROS master may end, too: nothing in flight asks it for anything, and the guard
+can still land and give authority back; services of the guard can then only be reached by who has
+called them before. Launch `dji_sdk` apart: what is launched with the guard ends with it.
+"""
+
 
 def table() -> str:
     """Return the document."""
     modes = [f"| {_name(mode)} | {MEANING[mode]} |" for mode in Mode]
     rules = [_row(number, rule) for number, rule in enumerate(RULES, 1)]
-    return HEAD + "\n".join(modes) + "\n" + RULES_HEAD + "\n".join(rules) + "\n"
+    return HEAD + "\n".join(modes) + "\n" + RULES_HEAD + "\n".join(rules) + "\n" + END
 
 
 def _row(number: int, rule: Rule) -> str:

@@ -68,6 +68,9 @@ class Plan:
     solve_time: float = 0.0  # [s] wall time
     cost: float = float("nan")
     kkt_residual: float = float("nan")
+    state_t: float = float(
+        "nan"
+    )  # [s] stamp of the newest telemetry it was made from; NaN: unknown
 
     @property
     def horizon(self) -> int:

@@ -40,6 +40,7 @@ class Finding(Enum):
     OK = "ok"
     NOT_FOUND = "not_found"
     SHAPE = "shape"
+    CLOCK = "clock"
     NOT_FINITE = "not_finite"
     TOO_OLD = "too_old"
     TOO_EARLY = "too_early"

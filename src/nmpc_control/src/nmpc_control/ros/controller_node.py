@@ -23,6 +23,7 @@ ROS Parameters:
 
 import queue
 import sys
+import time
 import traceback
 from collections import deque
 from dataclasses import replace
@@ -120,7 +121,8 @@ class ControllerNode:
         self.action.finish(rospy.Time.now().to_sec(), False, "the clock jumped backwards")
 
     def _tick(self, now: rospy.Time, misses: int) -> None:
-        t = now.to_sec()
+        t, begun = now.to_sec(), time.perf_counter()
+        state_stamp = self.state.newest
         while self._inputs:
             sent, u = self._inputs.popleft()
             self.controller.record_input(sent, None if u is None else np.array(u))
@@ -133,8 +135,10 @@ class ControllerNode:
         step = self.controller.step(t)
         self.publishers.diagnose(step, misses)
         if step is None:
+            if self.state.hears:
+                self.publishers.no_plan(now, self.controller.why_not(t), state_stamp)
             return
-        self.publishers.step(now, step, misses)
+        self.publishers.step(now, step, misses, state_stamp, time.perf_counter() - begun)
         itinerary = self.controller.itinerary
         if itinerary.clock_start is not None and itinerary.clock_start != clock_start:
             self.publishers.trajectory(self.scenario, itinerary.clock_start)
@@ -149,7 +153,8 @@ class ControllerNode:
             return
         try:
             scenario = scenario_of(goal, self._offered)
-            self._require_inside_fence(scenario.trajectory.sample(_along(scenario)).position)
+            along = np.linspace(0.0, scenario.trajectory.duration, 500)
+            self._require_inside_fence(scenario.trajectory.sample(along).position)
         except NmpcError as error:
             self._hold(t, str(error))  # accepting it has ended the goal before
             return
@@ -281,11 +286,6 @@ def load_node_parameters() -> Parameters:
         solver=replace(parameters.solver, backend=backend),
         avoidance=replace(parameters.avoidance, enabled=avoidance),
     )
-
-
-def _along(scenario: Scenario) -> np.ndarray:
-    """Return times [s] that cover a scenario's trajectory."""
-    return np.linspace(0.0, scenario.trajectory.duration, 500)
 
 
 def main() -> None:

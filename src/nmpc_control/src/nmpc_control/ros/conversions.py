@@ -72,12 +72,23 @@ def plan_from_msg(message: PlanMsg, frame_id: str) -> Tuple[Plan, Goal]:
         solve_time=message.solve_time,
         cost=message.cost,
         kkt_residual=message.kkt_residual,
+        state_t=message.state_stamp.to_sec() or math.nan,
     )
     return plan, Goal(message.goal)
 
 
-def plan_to_msg(step: Solved, header: Header, deadline_misses: int) -> PlanMsg:
-    """Return the message of a control step; the header's stamp is the plan's time."""
+def plan_to_msg(
+    step: Solved, header: Header, deadline_misses: int, state_stamp: float, tick_time: float
+) -> PlanMsg:
+    """Return the message of a control step; the header's stamp is the plan's time.
+
+    Args:
+        step: what was solved.
+        header: of the message.
+        deadline_misses: [1] since the node started.
+        state_stamp: [s] of the newest telemetry that it was made from.
+        tick_time: [s] wall time that the step has taken.
+    """
     plan = step.plan
     return PlanMsg(
         header=header,
@@ -96,7 +107,26 @@ def plan_to_msg(step: Solved, header: Header, deadline_misses: int) -> PlanMsg:
         cost=plan.cost,
         kkt_residual=plan.kkt_residual,
         predicted_clearance=step.predicted_clearance,
+        state_stamp=_time(state_stamp),
+        tick_time=tick_time,
         deadline_misses=deadline_misses,
+    )
+
+
+def refusal_to_msg(sentence: str, header: Header, state_stamp: float) -> PlanMsg:
+    """Return the message that says why there is no plan, with the stamp of what telemetry came."""
+    return PlanMsg(
+        header=header,
+        found=False,
+        solver_status=sentence,
+        dt=1.0,
+        horizon=1,
+        states=[0.0] * 2 * NX,
+        inputs=[0.0] * NU,
+        references=[0.0] * 6,
+        reference_time=math.nan,
+        predicted_clearance=math.nan,
+        state_stamp=_time(state_stamp),
     )
 
 
@@ -158,6 +188,11 @@ def _obstacle_to_msg(obstacle: Obstacle, t: float) -> ObstacleMsg:
             ahead = np.arange(1, len(obstacle.path) // stride + 1) * message.predicted_dt
             message.predicted_path = [Point(*p) for p in obstacle.position_at(t + ahead)]
     return message
+
+
+def _time(t: float) -> rospy.Time:
+    """Return a stamp [s]; 0 where it is not known."""
+    return rospy.Time.from_sec(t) if math.isfinite(t) else rospy.Time(0)
 
 
 def _pose(x: np.ndarray) -> Pose:

@@ -14,10 +14,12 @@ import rospy
 from dji_sdk.srv import DroneTaskControl, SDKControlAuthority, SetLocalPosRef
 from nmpc_control.dji import Task
 from nmpc_control.guard_data import Action
+from nmpc_control.ros.known_service import KnownService
 
 ATTEMPTS = 3  # [1] a refusal may be "in progress" only
 PAUSE = 1.0  # [s] between attempts
 WAIT = 2.0  # [s] for a service to appear
+LOOK = 1.0  # [s] between two looks for services not found yet
 
 _CALLS: Dict[Action, Tuple[str, type, Tuple[int, ...]]] = {
     Action.OBTAIN_AUTHORITY: ("dji_sdk/sdk_control_authority", SDKControlAuthority, (1,)),
@@ -45,6 +47,7 @@ class DjiServices:
         self._on_authority = on_authority
         self._on_failure = on_failure
         self._orders: "queue.Queue[Tuple[int, Sequence[Action]]]" = queue.Queue()
+        self._known = {name: KnownService(name, kind) for name, kind, _ in _CALLS.values()}
         self._newest = 0
         self.may_hold_authority = (
             False  # asked for, and not given back with an acknowledgement since
@@ -68,13 +71,20 @@ class DjiServices:
         """Give authority back in this thread, ahead of everything that waits."""
         self._newest += 1
         self._changed.set()
-        succeeded, sentence = _call(Action.RELEASE_AUTHORITY)
+        succeeded, sentence = self._call(Action.RELEASE_AUTHORITY)
         self.may_hold_authority = not succeeded
+        if succeeded:
+            self._on_authority(False)
         return succeeded, sentence
 
     def _work(self) -> None:
         while not rospy.is_shutdown():
-            number, actions = self._orders.get()
+            try:
+                number, actions = self._orders.get(timeout=LOOK)
+            except queue.Empty:
+                for service in self._known.values():
+                    service.find()  # before it is needed, while there is a master to ask
+                continue
             for action in actions:
                 if not self._carry_out(number, action):
                     break
@@ -84,7 +94,7 @@ class DjiServices:
             if number != self._newest:
                 return False
             self._changed.clear()
-            succeeded, sentence = _call(action)
+            succeeded, sentence = self._call(action)
             rospy.loginfo(sentence)
             if succeeded and action is Action.RELEASE_AUTHORITY:
                 self.may_hold_authority = False
@@ -99,20 +109,18 @@ class DjiServices:
         self._on_failure(sentence)
         return False
 
-
-def _call(action: Action) -> Tuple[bool, str]:
-    """Return whether dji_sdk carried out the action, and a sentence about it."""
-    name, kind, arguments = _CALLS[action]
-    try:
-        rospy.wait_for_service(name, WAIT)
-        answer = rospy.ServiceProxy(name, kind)(*arguments)
-    except rospy.ROSInterruptException:
-        return False, f"{action.value}: interrupted"
-    except (rospy.ROSException, rospy.ServiceException) as error:
-        return False, f"{action.value}: {name} does not answer: {error}"
-    if answer.result:
-        return True, f"{action.value}: done"
-    return False, f"{action.value} was refused{_reason(action, answer)}"
+    def _call(self, action: Action) -> Tuple[bool, str]:
+        """Return whether dji_sdk carried out the action, and a sentence about it."""
+        name, _, arguments = _CALLS[action]
+        try:
+            answer = self._known[name].call_within(WAIT, *arguments)
+        except rospy.ROSInterruptException:
+            return False, f"{action.value}: interrupted"
+        except (rospy.ROSException, rospy.ServiceException) as error:
+            return False, f"{action.value}: {name} does not answer: {error}"
+        if answer.result:
+            return True, f"{action.value}: done"
+        return False, f"{action.value} was refused{_reason(action, answer)}"
 
 
 def _reason(action: Action, answer: Any) -> str:

@@ -51,15 +51,21 @@ class GuardListener:
             subscriptions.add(topic, kind, self._locked(callback))
         self.obstacles.subscribe(subscriptions, known=True)
 
-    def take(self, t: float, steady: Optional[float], request: Optional[Request]) -> GuardInputs:
+    def take(
+        self,
+        t: float,
+        steady: Optional[float],
+        request: Optional[Request],
+        leaving: bool = False,
+    ) -> GuardInputs:
         """Return what a tick at ``t`` [s] sees, with the operator's request.
 
-        ``steady`` [s] is a clock that nobody sets; None: ``t`` is one.
+        ``steady`` [s] is a clock that nobody sets; None: ``t`` is one. ``leaving``: the guard ends.
         """
         with self._lock:
             if self.avoidance:
                 self._inbox.obstacles, self._inbox.obstacles_stale = self.obstacles.look(t)
-            self._inbox.request = request
+            self._inbox.request, self._inbox.leaving = request, leaving
             sources = self.state.sources
             self._inbox.needs_gps = sources.active == GPS
             yaw = sources.yaw_disagreement(t)

@@ -40,6 +40,7 @@ from nmpc_control.guard_data import Action, GuardOutput
 from nmpc_control.guard_params import load_guard_parameters
 from nmpc_control.mode_inputs import AUTOMATIC, ModeInputs, Request
 from nmpc_control.params import load_parameters
+from nmpc_control.ros.departure import Departure
 from nmpc_control.ros.dji_services import DjiServices
 from nmpc_control.ros.guard_listener import GuardListener
 from nmpc_control.ros.guard_reports import GuardReports
@@ -75,7 +76,7 @@ class GuardNode:
         SourceSwitch(self._listener.state, lambda: guard.mode in AUTOMATIC)
         self._dji = DjiServices(self._listener.set_authority, self._listener.report_failure)
         self._questions: "queue.Queue[_Question]" = queue.Queue(maxsize=10)
-        self._is_leaving = False
+        self._departure = Departure(self._dji)
         self._t = 0.0
         self._world_frame = guard.params.world_frame
         self._telemetry = ModeInputs()  # of the last tick
@@ -87,20 +88,31 @@ class GuardNode:
         self._has_steady = not rospy.get_param("/use_sim_time", False)
         for request in Request:
             rospy.Service(request.value, Trigger, self._serve(request))
-        rospy.on_shutdown(self._leave)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._departure.on_signal)
+        rospy.on_shutdown(self._departure.on_shutdown)
 
     def run(self) -> None:
-        """Tick until shutdown; a tick that fails is reported and answered with a brake."""
-        while rospy.Time.now().is_zero() and not rospy.is_shutdown():
+        """Tick until told to end; a tick that fails is reported and answered with a brake."""
+        try:
+            self._stream()
+        finally:
+            self._departure.end()
+
+    def _stream(self) -> None:
+        while rospy.Time.now().is_zero() and not self._must_stop():
             time.sleep(0.01)  # of wall time: with /use_sim_time there is no other yet
         rate = rospy.Rate(self.guard.params.rate)
         ticked = time.monotonic()
-        while not (rospy.is_shutdown() or self._is_leaving):
+        while not rospy.is_shutdown():
+            is_last = self._must_stop()
             try:
-                self._tick(rospy.Time.now())
+                self._tick(rospy.Time.now(), Request.RELEASE if is_last else None)
             except Exception as error:  # noqa: BLE001 (the stream must not end with one bad message)
                 rospy.logerr_throttle(1.0, f"tick failed: {traceback.format_exc(limit=-3)}")
                 self._give_way(error)
+            if is_last:
+                break
             try:
                 rate.sleep()
             except rospy.ROSTimeMovedBackwardsException:
@@ -117,13 +129,19 @@ class GuardNode:
         """Brake or release after a tick that failed outside the guard itself."""
         try:
             output = self.guard.give_way(self._t, self._telemetry, error)
-            if output.axes is not None and not self._is_leaving:
+            if output.axes is not None and not self._must_stop():
                 self._setpoint.publish(Joy(axes=output.axes))
             self._act(output)
         except Exception:  # noqa: BLE001 (there is nothing left to fall back to but the next tick)
             rospy.logerr_throttle(1.0, f"giving way failed: {traceback.format_exc(limit=-3)}")
 
-    def _tick(self, now: rospy.Time) -> None:
+    def _must_stop(self) -> bool:
+        """Return whether the guard was told to end, and nothing has to be held any more."""
+        if not self._departure.is_due:
+            return False
+        return self._departure.is_over or self.guard.mode not in AUTOMATIC
+
+    def _tick(self, now: rospy.Time, last_request: Optional[Request]) -> None:
         if now.to_sec() < self._t - CLOCK_STEP:
             self._t = now.to_sec()
             self._listener.start_anew()
@@ -131,24 +149,30 @@ class GuardNode:
             return
         t = max(now.to_sec(), self._t)  # a small step back: time stands still until it is caught up
         self._t = t
+        begun = time.perf_counter()
         question = self._next_question()
+        request = question.request if question else None
         steady = time.monotonic() if self._has_steady else None  # simulated time is steady itself
-        inputs = self._listener.take(t, steady, question.request if question else None)
+        inputs = self._listener.take(
+            t, steady, last_request or request, leaving=self._departure.is_due
+        )
         self._telemetry = inputs.telemetry
         try:
             output = self.guard.tick(inputs)
         except Exception as error:  # noqa: BLE001 (whatever it is, the aircraft is in the air)
             rospy.logerr_throttle(1.0, traceback.format_exc(limit=-3))
             output = self.guard.give_way(t, inputs.telemetry, error)
-        if output.axes is not None and not self._is_leaving:
+        if output.axes is not None and not last_request:
             self._setpoint.publish(Joy(header=Header(stamp=now), axes=output.axes))
+        duration = time.perf_counter() - begun
         self._act(output)
         if question:
             question.answer = output.answer or (False, output.reason)
             question.answered.set()
             rospy.loginfo(f"{question.request.value}: {question.answer[1]}")
         obstacle_age = self._listener.obstacles.age(t)
-        self._reports.publish(now, inputs, output, self._listener.last_plan, obstacle_age)
+        last_plan = self._listener.last_plan
+        self._reports.publish(now, inputs, output, last_plan, obstacle_age, duration)
 
     def _act(self, output: GuardOutput) -> None:
         if Action.RELEASE_AUTHORITY in output.actions:
@@ -158,14 +182,8 @@ class GuardNode:
         if Action.RETURN in output.actions:
             header = Header(stamp=rospy.Time.from_sec(self._t), frame_id=self._world_frame)
             self._return.publish(PointStamped(header, Point(*output.target)))
-        self._dji.order(output.actions)
-
-    def _leave(self) -> None:
-        """Give authority back while ROS still lives: silence alone is not relied upon."""
-        self._is_leaving = True
-        if self._dji.may_hold_authority:
-            _, sentence = self._dji.release_now()
-            rospy.logwarn(f"shutting down: {sentence}")
+        if not self._departure.is_due:
+            self._dji.order(output.actions)
 
     def _serve(self, request: Request) -> Callable[[TriggerRequest], TriggerResponse]:
         def handle(_: TriggerRequest) -> TriggerResponse:
@@ -181,9 +199,14 @@ class GuardNode:
 
     def _next_question(self) -> Optional[_Question]:
         try:
-            return self._questions.get_nowait()
+            question = self._questions.get_nowait()
         except queue.Empty:
             return None
+        if not self._departure.is_due:
+            return question
+        question.answer = (False, "the guard is ending")
+        question.answered.set()
+        return None
 
 
 def main() -> None:

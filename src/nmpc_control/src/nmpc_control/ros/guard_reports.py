@@ -8,7 +8,6 @@ import math
 import os
 from typing import Callable, Optional, Tuple
 
-import diagnostic_updater
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
 
@@ -16,12 +15,13 @@ from nmpc_control.guard import Guard
 from nmpc_control.guard_data import GuardInputs, GuardOutput
 from nmpc_control.ladder import Rung
 from nmpc_control.mode_inputs import PLANNED, Mode
+from nmpc_control.ros.diagnostics import Diagnostics, Wrapper
 from nmpc_control.state import Goal
 from nmpc_msgs.msg import ControlInput, ControllerStatus, Plan
 
-Wrapper = diagnostic_updater.DiagnosticStatusWrapper
 _ATTENTION = (Mode.BRAKING, Mode.RELEASED, Mode.FAULT)
 LATE_SHARE = 0.02  # [1] of late periods from which on the loop is reported
+LONG_WAY = 0.3  # [s] from telemetry to the plan made of it, from which on it is reported
 OVERLOAD = 1.0  # [1] processes that want a core, per core
 _SILENT = ControlInput(math.nan, math.nan, math.nan, math.nan)
 
@@ -36,17 +36,16 @@ class GuardReports:
         self._status = rospy.Publisher(
             "nmpc/status", ControllerStatus, queue_size=10, tcp_nodelay=True
         )
-        self._updater = diagnostic_updater.Updater()
-        self._updater.setHardwareID("M100")
-        self._updater.add("flight", self._diagnose_flight)
-        self._updater.add("telemetry", self._diagnose_telemetry)
-        self._updater.add("plans", self._diagnose_plans)
-        self._updater.add("loop", self._diagnose_loop)
-        self._updater.add("battery", self._diagnose_battery)
+        self._diagnostics = Diagnostics("M100")
+        self._diagnostics.add("flight", self._diagnose_flight)
+        self._diagnostics.add("telemetry", self._diagnose_telemetry)
+        self._diagnostics.add("plans", self._diagnose_plans)
+        self._diagnostics.add("loop", self._diagnose_loop)
+        self._diagnostics.add("battery", self._diagnose_battery)
 
     def add(self, name: str, diagnose: Callable[[Wrapper], Wrapper]) -> None:
         """Have another entry in /diagnostics."""
-        self._updater.add(name, diagnose)
+        self._diagnostics.add(name, diagnose)
 
     def publish(
         self,
@@ -55,8 +54,12 @@ class GuardReports:
         output: GuardOutput,
         last_plan: Plan,
         obstacle_age: float,
+        tick_time: float,
     ) -> None:
-        """Publish one tick; ``last_plan`` is the newest plan message, an empty one without."""
+        """Publish one tick, which has taken ``tick_time`` [s].
+
+        ``last_plan`` is the newest plan message, an empty one without.
+        """
         guard, telemetry = self._guard, inputs.telemetry
         ages = (telemetry.position_age, telemetry.velocity_age, telemetry.attitude_age)
         message = ControllerStatus(
@@ -85,13 +88,16 @@ class GuardReports:
             deadline_misses=last_plan.deadline_misses,
             predicted_clearance=output.clearance,
             battery=telemetry.battery,
+            tick_time=tick_time,
+            clock_offset=guard.link.offset,
+            link_delay=guard.link.delay,
             loop_rate=guard.situation.loop.rate,
             loop_jitter=guard.situation.loop.jitter,
         )
         message.header.stamp = now
         self._status.publish(message)
         self._last = (inputs, output)
-        self._updater.update()
+        self._diagnostics.update()
 
     def _diagnose_flight(self, status: Wrapper) -> Wrapper:
         if self._last is None:
@@ -140,6 +146,14 @@ class GuardReports:
         is_fresh = age <= self._guard.params.plan_check.timeout
         level = DiagnosticStatus.OK if is_fresh else DiagnosticStatus.WARN
         status.summary(level, f"last verified plan {age:.2f} s ago")
+        link = self._guard.link
+        if link.finding:
+            status.summary(DiagnosticStatus.ERROR, link.finding)
+        elif link.delay > LONG_WAY:
+            words = f"from telemetry to plan it takes up to {1e3 * link.delay:.0f} ms"
+            status.summary(DiagnosticStatus.WARN, words)
+        status.add("controller's clock ahead [ms]", f"{1e3 * link.offset:.1f}")
+        status.add("telemetry to plan [ms]", f"{1e3 * link.delay:.0f}")
         status.add("received", str(ladder.received))
         status.add("rejected", str(ladder.rejected))
         return status

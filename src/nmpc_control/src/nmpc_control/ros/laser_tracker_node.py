@@ -19,7 +19,6 @@ import time
 import traceback
 from typing import Optional
 
-import diagnostic_updater
 import numpy as np
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -32,6 +31,7 @@ from nmpc_control.laser_tracking.poses import PoseHistory
 from nmpc_control.laser_tracking.scan import Scan, ScanError
 from nmpc_control.laser_tracking.tracker import RESTART, LaserTracker
 from nmpc_control.ros.conversions import obstacles_to_msg
+from nmpc_control.ros.diagnostics import Diagnostics, Wrapper
 from nmpc_control.ros.source_switch import TOPIC, follow
 from nmpc_control.ros.state_port import StatePort
 from nmpc_control.ros.subscriptions import Subscriptions
@@ -60,9 +60,8 @@ class LaserTrackerNode:
         self._obstacles = rospy.Publisher(
             "obstacles", ObstacleArray, queue_size=1, tcp_nodelay=True
         )
-        self._updater = diagnostic_updater.Updater()
-        self._updater.setHardwareID("laser")
-        self._updater.add("scans", self._diagnose)
+        self._diagnostics = Diagnostics("laser")
+        self._diagnostics.add("scans", self._diagnose)
         self._subscribe()
 
     def run(self) -> None:
@@ -78,7 +77,7 @@ class LaserTrackerNode:
             except Exception:  # noqa: BLE001 (one bad scan must not end the sight of an aircraft)
                 self.tracker.counts["failed"] += 1
                 rospy.logerr_throttle(1.0, f"scan failed: {traceback.format_exc(limit=-3)}")
-            self._updater.update()
+            self._diagnostics.update()
 
     def _take(self, message: LaserScan) -> None:
         begin = time.perf_counter()
@@ -122,9 +121,7 @@ class LaserTrackerNode:
         self._scan = message
         self._arrived.set()
 
-    def _diagnose(
-        self, status: diagnostic_updater.DiagnosticStatusWrapper
-    ) -> diagnostic_updater.DiagnosticStatusWrapper:
+    def _diagnose(self, status: Wrapper) -> Wrapper:
         age = self._now - self._heard
         if self._refusal:
             status.summary(DiagnosticStatus.WARN, self._refusal)

@@ -9,7 +9,6 @@ nmpc/trajectory, nmpc/obstacles, nmpc/known_obstacles, nmpc/room; tf world -> ba
 
 from typing import Callable, Optional, Sequence, Tuple
 
-import diagnostic_updater
 import numpy as np
 import rospy
 import tf2_ros
@@ -36,7 +35,9 @@ from nmpc_control.ros.conversions import (
     odometry_to_msg,
     plan_to_msg,
     prediction_to_msg,
+    refusal_to_msg,
 )
+from nmpc_control.ros.diagnostics import Diagnostics, Wrapper
 from nmpc_control.rotations import quaternion_from_rpy
 from nmpc_control.scenario import Scenario
 from nmpc_control.state import POSITION, YAW
@@ -69,14 +70,15 @@ class Publishers:
         self._shown_at = 0.0  # [s]
         self._steps = 0
         self._last: Tuple[Optional[Step], int] = (None, 0)
-        self._updater = diagnostic_updater.Updater()
-        self._updater.setHardwareID("M100")
-        self._updater.add("solver", self._diagnose_solver)
+        self._diagnostics = Diagnostics("M100")
+        self._diagnostics.add("solver", self._diagnose_solver)
 
-    def step(self, now: rospy.Time, step: Step, misses: int) -> None:
-        """Publish everything that one control step produced."""
+    def step(
+        self, now: rospy.Time, step: Step, misses: int, state_stamp: float, tick_time: float
+    ) -> None:
+        """Publish everything that one control step produced; arguments as of ``plan_to_msg``."""
         header = Header(stamp=now, frame_id=self.frame_id)
-        self._plan.publish(plan_to_msg(step, header, misses))
+        self._plan.publish(plan_to_msg(step, header, misses, state_stamp, tick_time))
         self._steps += 1
         if self._steps % 2 == 0 and step.is_promise:
             self._prediction.publish(prediction_to_msg(step, header))
@@ -92,20 +94,19 @@ class Publishers:
             TransformStamped(header, self.base_frame, Transform(translation, pose.orientation))
         )
 
-    def add_diagnostics(
-        self,
-        name: str,
-        diagnose: Callable[
-            [diagnostic_updater.DiagnosticStatusWrapper], diagnostic_updater.DiagnosticStatusWrapper
-        ],
-    ) -> None:
+    def no_plan(self, now: rospy.Time, sentence: str, state_stamp: float) -> None:
+        """Tell the guard why there is no plan."""
+        header = Header(stamp=now, frame_id=self.frame_id)
+        self._plan.publish(refusal_to_msg(sentence, header, state_stamp))
+
+    def add_diagnostics(self, name: str, diagnose: Callable[[Wrapper], Wrapper]) -> None:
         """Have another entry in /diagnostics."""
-        self._updater.add(name, diagnose)
+        self._diagnostics.add(name, diagnose)
 
     def diagnose(self, step: Optional[Step], misses: int) -> None:
         """Refresh /diagnostics, at most once a second."""
         self._last = (step, misses)
-        self._updater.update()
+        self._diagnostics.update()
 
     def trajectory(self, scenario: Scenario, clock_start: Optional[float]) -> None:
         """Publish the whole reference.
@@ -155,9 +156,7 @@ class Publishers:
         message.polygon.points = corners
         self._room.publish(message)
 
-    def _diagnose_solver(
-        self, status: diagnostic_updater.DiagnosticStatusWrapper
-    ) -> diagnostic_updater.DiagnosticStatusWrapper:
+    def _diagnose_solver(self, status: Wrapper) -> Wrapper:
         step, misses = self._last
         if step is None:
             status.summary(DiagnosticStatus.WARN, "no fresh state: not solving")

@@ -15,6 +15,7 @@ stamp; a buffer would have to be asked again and again and would interpolate wha
 
 import math
 import threading
+import time
 from typing import Any, Callable, Dict, Optional, Tuple
 
 import rospy
@@ -37,6 +38,7 @@ from nmpc_control.source_params import (
 from nmpc_control.state_sources import StateSources
 
 TRANSFORMS = 100  # messages of /tf kept: many send there, and the newest is not always Vicon's
+SILENCE = 0.5  # [s] of wall time without an attitude: no telemetry comes
 POINTS = {GPS: "dji_sdk/local_position", WORLD_POSITION: "world_position"}
 
 
@@ -60,6 +62,8 @@ class StatePort:
         self._add_attitude = add_attitude
         self._world_frame = world_frame.strip("/")
         self._vicon_frame = parameters.vicon_frame.strip("/")
+        self.newest = math.nan  # [s] stamp of the newest attitude, as it came
+        self._heard = -math.inf  # [s] steady clock, when that was
         self._jumps: Dict[str, int] = {}  # of each source, as far as they were told
 
     def subscribe(self, subscriptions: Subscriptions) -> None:
@@ -73,6 +77,11 @@ class StatePort:
                 add(POINTS[name], PointStamped, self._locked(self._point_taker(name)))
         if VICON in self.sources.tracks:
             add("/tf", TFMessage, self._on_transforms, TRANSFORMS, self._hears_vicon)
+
+    @property
+    def hears(self) -> bool:
+        """Whether telemetry comes, whatever its stamps say."""
+        return time.monotonic() - self._heard < SILENCE
 
     def start_anew(self, estimator: Estimator) -> None:
         """Forget all samples, as after a jump of the clock, and go on with another estimator."""
@@ -114,6 +123,7 @@ class StatePort:
     def _on_attitude(self, message: QuaternionStamped) -> None:
         add = self._add_attitude or self.sources.estimator.add_attitude
         add(stamp_of(message.header), _xyzw(message.quaternion))
+        self.newest, self._heard = message.header.stamp.to_sec(), time.monotonic()
 
     def _on_imu(self, message: Imu) -> None:
         rates = _xyz(message.angular_velocity)

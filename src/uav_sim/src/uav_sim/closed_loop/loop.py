@@ -88,6 +88,11 @@ class ClosedLoop:
         """Simulated time [s]."""
         return self.aircraft.t
 
+    @property
+    def controller_time(self) -> float:
+        """Simulated time [s] by the controller's clock."""
+        return self.t
+
     def step(self) -> None:
         """Advance by one step: telemetry, solve when due, guard when due, aircraft."""
         for packet in self.aircraft.step():
@@ -107,16 +112,7 @@ class ClosedLoop:
             self.log.truths.append(self.aircraft.truth)
 
     def _receive(self, topic: str, t: float, value: Any) -> None:
-        for sources in self.sources:
-            estimator = sources.estimator
-            if topic == "attitude":
-                estimator.add_attitude(t, value)
-            elif topic == "imu":
-                estimator.add_imu(t, value.angular_velocity)
-            elif topic == "velocity":
-                sources.add_velocity(t, value)
-            elif topic == "local_position":
-                sources.add_position(GPS, t, value)
+        self._hear(topic, t, value)
         timed: Dict[str, Callable[[float, Any], None]] = {
             "rc": self.inbox.add_rc,
             "flight_status": self.inbox.add_flight_status,
@@ -128,6 +124,10 @@ class ClosedLoop:
         elif topic == "height_above_takeoff":
             self.inbox.add_height(value)
 
+    def _hear(self, topic: str, t: float, value: Any) -> None:
+        for sources in self.sources:
+            hear(sources, topic, t, value)
+
     def _look(self) -> None:
         sensed = [_known(state, self.t) for state in self.aircraft.sensed_obstacles]
         self.controller.obstacles = self.inbox.obstacles = tuple(sensed)
@@ -138,10 +138,13 @@ class ClosedLoop:
         step = self.controller.step(self.t)
         if step is None:
             return
-        self.inbox.add_plan(step.plan, step.goal)
+        self._send(step)
         if self.controller.itinerary.clock_start is not None:
             self.log.clock_start = self.controller.itinerary.clock_start
         self.log.steps.append(step)
+
+    def _send(self, step: Step) -> None:
+        self.inbox.add_plan(step.plan, step.goal)
 
     def _tick(self) -> None:
         self.inbox.needs_gps = self.sources[1].active == GPS
@@ -150,13 +153,17 @@ class ClosedLoop:
             self._act(action, output)
         if output.axes is not None:
             self.aircraft.setpoint(_GENERIC, output.axes)
+        self._tell(self.t, output)
+        self.log.outputs.append((self.t, output))
+
+    def _tell(self, t: float, output: GuardOutput) -> None:
+        """Have the controller know what the guard did at ``t`` [s], as by its status."""
         known = output.axes is not None and output.applied is not None
-        self.controller.record_input(self.t, np.array(output.applied) if known else None)
+        self.controller.record_input(t, np.array(output.applied) if known else None)
         self.controller.engaged = output.mode in PLANNED
         self.controller.braking = output.mode is Mode.BRAKING
         self.controller.held_back = output.mode in PLANNED and output.rung in BRAKES
         self.controller.manual = output.mode in FOLLOWED
-        self.log.outputs.append((self.t, output))
 
     def _act(self, action: Action, output: GuardOutput) -> None:
         if action is Action.OBTAIN_AUTHORITY:
@@ -171,11 +178,13 @@ class ClosedLoop:
         elif action is Action.SET_REFERENCE:
             self.aircraft.set_local_position_reference()
         elif action is Action.HOLD:
-            x = self.controller.estimator.estimate(self.t).vector
+            x = self.controller.estimator.estimate(self.controller_time).vector
             self.controller.itinerary.hold(x[:3], x[5])
         elif action is Action.RETURN:
-            x = self.controller.estimator.estimate(self.t).vector
-            self.controller.itinerary.go_to(self.t, x[:3], x[5], np.array(output.target), x[5])
+            x = self.controller.estimator.estimate(self.controller_time).vector
+            self.controller.itinerary.go_to(
+                self.controller_time, x[:3], x[5], np.array(output.target), x[5]
+            )
 
 
 def fly(
@@ -209,19 +218,31 @@ def fly(
         if loop.t > _START_TIMEOUT:
             raise NoFlightError(f"automatic flight did not begin: {loop.log.outputs[-1][1].reason}")
     itinerary = loop.controller.itinerary
-    x = loop.controller.estimator.estimate(loop.t).vector
+    x = loop.controller.estimator.estimate(loop.controller_time).vector
     if approach:
-        itinerary.fly(loop.t, x[:3], x[5], scenario.trajectory)
+        itinerary.fly(loop.controller_time, x[:3], x[5], scenario.trajectory)
     else:
-        itinerary.begin(loop.t, scenario.trajectory)
+        itinerary.begin(loop.controller_time, scenario.trajectory)
     while itinerary.outcome is None and loop.guard.mode in STREAMING:
         loop.step()
-        on_progress(itinerary.progress(loop.t))
+        on_progress(itinerary.progress(loop.controller_time))
     end = loop.t + _AFTER_ARRIVAL
     while loop.t < end:
         loop.step()
     loop.log.end = loop.t
     return loop.log
+
+
+def hear(sources: StateSources, topic: str, t: float, value: Any) -> None:
+    """Hand a message of ``dji_sdk`` with the stamp ``t`` [s] to those sources that it concerns."""
+    if topic == "attitude":
+        sources.estimator.add_attitude(t, value)
+    elif topic == "imu":
+        sources.estimator.add_imu(t, value.angular_velocity)
+    elif topic == "velocity":
+        sources.add_velocity(t, value)
+    elif topic == "local_position":
+        sources.add_position(GPS, t, value)
 
 
 def _known(state: BodyState, t: float) -> Obstacle:

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: MIT
+"""Fly through ROS for minutes with one core kept busy; write figures, say which bars are kept.
+
+The simulator runs at real time on this machine. A bare 50 Hz process beside it tells what the
+machine does to any such process: jitter, gaps and the time of a tick count above that.
+"""
+
+import argparse
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Dict, List, Optional
+
+import numpy as np
+
+from nmpc_control.errors import NmpcError
+from nmpc_control.scenario import load_scenario, scenario_path
+from uav_sim.closed_loop.bench.machine import machine
+from uav_sim.closed_loop.soak.figures import figures, rows, table
+from uav_sim.errors import SimulatorError
+from uav_sim.preset import load_preset
+
+BURN = "while True: pass"
+EXTRA = 180.0  # [s] wall time beside the flight, for start and landing
+GRACE = 20.0  # [s] roslaunch itself gives its nodes 17 s
+
+
+def main(argv: Optional[List[str]] = None) -> None:
+    """Entry point of ``soak``; exit status 1 where a bar is not kept, 2 on bad input."""
+    options = _parser().parse_args(argv)
+    try:
+        scenario = load_scenario(options.scenario)
+        load_preset(options.plant)
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        noted = _fly(options, scenario.name)
+        found = {**figures(noted), "machine": machine(), "busy_processes": options.burners}
+        found["rows"] = [row._asdict() for row in rows(found)]
+        options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    except (NmpcError, SimulatorError) as error:
+        _fail(str(error))
+    except OSError as error:
+        _fail(f"{error.filename}: {error.strerror}")
+    sys.stdout.write(f"{table(found)}\nsoak: {options.json}\n")
+    sys.exit(0 if all(row.passed for row in rows(found)) else 1)
+
+
+def _fly(options: argparse.Namespace, name: str) -> Dict[str, np.ndarray]:
+    """Return what was noted; raises SimulatorError where the flight did not come about."""
+    with tempfile.TemporaryDirectory() as folder:
+        file, log = Path(folder) / "noted.npz", Path(folder) / "log.txt"
+        path = scenario_path(options.scenario).resolve()
+        port = _free_port()
+        environment = {
+            **os.environ,
+            "ROS_MASTER_URI": f"http://localhost:{port}",
+            "ROS_HOSTNAME": "localhost",
+            "ROS_IP": "127.0.0.1",
+            "ROS_LOG_DIR": folder,
+        }
+        command = [
+            *("roslaunch", "-p", str(port), "uav_sim", "soak.launch"),
+            f"minutes:={options.minutes}",
+            f"scenario:={name}",
+            f"scenario_file:={path}",
+            f"plant:={options.plant}",
+            f"file:={file}",
+        ]
+        started: List[subprocess.Popen] = []
+        try:
+            for _ in range(options.burners):
+                started.append(subprocess.Popen([sys.executable, "-c", BURN]))
+            with open(log, "w", encoding="utf-8") as output:
+                started.append(
+                    subprocess.Popen(
+                        command,
+                        env=environment,
+                        stdout=output,
+                        stderr=output,
+                        start_new_session=True,
+                    )
+                )
+            started[-1].wait(60.0 * options.minutes + EXTRA)
+        except subprocess.TimeoutExpired:
+            pass
+        finally:
+            for process in reversed(started):
+                _end(process)
+        if not file.is_file():
+            last = log.read_text(encoding="utf-8", errors="replace").splitlines()[-20:]
+            raise SimulatorError("the flight did not come about:\n" + "\n".join(last))
+        with np.load(file) as noted:
+            return dict(noted)
+
+
+def _end(process: subprocess.Popen) -> None:
+    """End a process, and all that roslaunch has started."""
+    if process.poll() is not None:
+        return
+    is_leader = os.getpgid(process.pid) == process.pid
+    for number in (signal.SIGINT, signal.SIGKILL):
+        if is_leader:
+            os.killpg(process.pid, number)
+        else:
+            process.send_signal(number)
+        try:
+            process.wait(GRACE)
+            return
+        except subprocess.TimeoutExpired:
+            continue
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="soak", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument(
+        "--minutes", type=_minutes, default=10.0, help="of flight (default: %(default)s)"
+    )
+    parser.add_argument("--scenario", default="multi_obstacle", help="flown again and again")
+    parser.add_argument("--plant", default="dji_hil", help="preset of the simulator")
+    parser.add_argument("--burners", type=int, default=1, help="processes that compute for nothing")
+    parser.add_argument("--json", type=Path, default=Path("build/soak.json"), help="figures")
+    return parser
+
+
+def _minutes(text: str) -> float:
+    value = float(text)
+    if not 0.1 <= value <= 600.0:
+        raise argparse.ArgumentTypeError(f"got {text}, expected minutes in [0.1, 600]")
+    return value
+
+
+def _fail(text: str) -> None:
+    sys.stderr.write(f"soak: {text}\n")
+    sys.exit(2)
