@@ -10,7 +10,7 @@ from typing import Optional
 
 import numpy as np
 
-from nmpc_control.config import config_directory, from_dict, load_yaml
+from nmpc_control.config import config_directory, from_dict, load_profile, load_yaml, overlay
 
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97")  # all but the first are HSL
 
@@ -227,12 +227,19 @@ def load_weights(name: str, directory: Optional[Path] = None) -> Weights:
 
 
 def load_parameters(
-    vehicle: str = "dji_hil", weights: str = "outdoor", directory: Optional[Path] = None
+    vehicle: str = "dji_hil",
+    weights: str = "outdoor",
+    directory: Optional[Path] = None,
+    profile: str = "",
 ) -> Parameters:
-    """Return the controller's parameters with a vehicle and a weight preset; raises ConfigError."""
+    """Return the controller's parameters with a vehicle and a weight preset; raises ConfigError.
+
+    ``profile`` names a file of ``config/profiles`` whose values win over controller.yaml's.
+    """
     directory = directory or config_directory()
     path = directory / "controller.yaml"
-    data = load_yaml(path)
+    changes = load_profile(profile, "controller", directory)
+    data = overlay(load_yaml(path), changes, f"{profile}.yaml", "controller")
     return from_dict(_File, data, path.name).with_presets(
         load_vehicle(vehicle, directory), load_weights(weights, directory)
     )

@@ -13,8 +13,8 @@ ROS Subscribers:
 ROS Action: fly_trajectory (nmpc_msgs/FlyTrajectory). ROS Services: see ``resume_service``.
 ROS Publishers: see ``publishers``.
 ROS Parameters:
-    ~vehicle (str): file under config/vehicles. ~weights (str): weight preset, default the
-    scenario's own.
+    ~vehicle (str): file under config/vehicles. ~profile (str): file under config/profiles.
+    ~weights (str): weight preset, default the scenario's own.
     ~scenario (str): name or path of a scenario that is offered beside the named ones.
     ~backend (str): compiled or ipopt. ~avoidance (bool): false removes the obstacle term.
     ~frame_id (str): world frame. ~base_frame (str): body frame, default base_link below the
@@ -60,7 +60,8 @@ class ControllerNode:
     def __init__(self) -> None:
         self.frame_id = rospy.get_param("~frame_id", "world")
         self.parameters = load_node_parameters()
-        self._vertical_command = load_guard_parameters().vertical_command
+        guard = load_guard_parameters(profile=rospy.get_param("~profile", ""))
+        self._vertical_command = guard.vertical_command
         self.controller = Controller(self.parameters, self._vertical_command)
         self.scenario: Optional[Scenario] = None
         offered = rospy.get_param("~scenario", "")
@@ -271,7 +272,8 @@ def load_node_parameters() -> Parameters:
     vehicle = rospy.get_param("~vehicle", "")
     if not vehicle:
         raise ConfigError("parameter", "~vehicle", vehicle, "the name of a file in config/vehicles")
-    parameters = load_parameters(vehicle, rospy.get_param("~weights", "") or "outdoor")
+    weights = rospy.get_param("~weights", "") or "outdoor"
+    parameters = load_parameters(vehicle, weights, profile=rospy.get_param("~profile", ""))
     backend = rospy.get_param("~backend", parameters.solver.backend)
     if backend not in ("compiled", "ipopt"):
         raise ConfigError("parameter", "~backend", backend, "compiled or ipopt")
