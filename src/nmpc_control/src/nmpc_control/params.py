@@ -10,6 +10,7 @@ from typing import Optional
 
 import numpy as np
 
+from nmpc_control.battery_thrust import BatteryCurve
 from nmpc_control.config import config_directory, from_dict, load_profile, load_yaml, overlay
 
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97")  # all but the first are HSL
@@ -79,6 +80,7 @@ class Vehicle:
     disturbance: np.ndarray = field(  # (3,) [m/s^2] constant acceleration in the world frame
         default_factory=lambda: np.zeros(3), metadata={"length": 3}
     )
+    battery: Optional[BatteryCurve] = None  # what the charge leaves of the thrust; None: all
 
 
 @dataclass(frozen=True)
