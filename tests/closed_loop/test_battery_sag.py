@@ -44,6 +44,7 @@ def flown(knows, plant="dji_hil", percent=LOW, drain=1.0, seconds=8.0):
         loop.step()
         assert loop.t < 20.0, loop.log.outputs[-1][1].reason
     loop.began = loop.t
+    loop.gain = loop.guard._setpoints.battery.gain  # as the start found it
     while loop.t < loop.began + seconds:
         loop.step()
     return loop
@@ -65,6 +66,9 @@ def test_with_the_curve_the_height_is_kept_at_a_hand_over(handed_over):
     _, error = errors(handed_over[True])
     assert np.abs(error).max() < 0.2
     assert handed_over[True].guard.mode in PLANNED
+    curve = load_parameters("dji_hil").vehicle.battery
+    assert handed_over[True].gain == pytest.approx(curve.at(LOW / 100.0), abs=0.005)
+    assert handed_over[False].gain == 1.0
 
 
 def test_twin_without_it_the_aircraft_drops_first(handed_over):

@@ -2,11 +2,16 @@
 """The battery's share of the thrust: curve, bounds, begun anew wherever thrust is not commanded."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 
 from nmpc_control import dji
+from nmpc_control.analysis.identification.thrust import Map
+from nmpc_control.analysis.identification.thrust_fit import Late
+from nmpc_control.analysis.identification.vehicle_file import _battery
 from nmpc_control.battery_thrust import LEAST, RATE, BatteryCurve, BatteryThrust
 from nmpc_control.config import from_dict
 from nmpc_control.errors import ConfigError
@@ -92,3 +97,22 @@ def test_what_the_motors_cannot_give_is_not_told_as_given():
     assert axes[2] == 40.0
     applied = dji.input_from_axes(axes, vehicle, 0.9)[0]
     assert applied == pytest.approx(0.9 * narrow.thrust(40.0))
+
+
+def test_an_identified_slope_becomes_a_curve_of_the_vehicle_file():
+    """Hover is at 38 % of thrust at a charge of 60 %, and 0.1 % more for each percent less."""
+    thrust_map = Map(0.2, 9.81 - 0.2 * 38.0, 0.0, Late(0.1))
+    estimate = SimpleNamespace(values={"charge_percent": 60.0})
+    levels = tuple({"battery_percent": c, "samples": 30} for c in (30.0, 60.0, 90.0))
+    found = SimpleNamespace(
+        thrust=SimpleNamespace(map=thrust_map, estimate=estimate),
+        battery=SimpleNamespace(slope=-0.1, levels=levels),
+    )
+    text = "".join(f"{line}\n" for line, _ in _battery(found))
+    curve = from_dict(BatteryCurve, yaml.safe_load(text)["battery"], "own.yaml")
+    assert curve.charge == pytest.approx([0.3, 0.5, 0.7, 0.9])
+    for charge in (30.0, 50.0, 70.0, 90.0):
+        hover = 38.0 - 0.1 * (charge - 60.0)
+        assert curve.at(charge / 100.0) * thrust_map.thrust(hover) == pytest.approx(9.81, rel=1e-3)
+    found.battery.slope = None
+    assert _battery(found) == []

@@ -106,7 +106,8 @@ def test_the_controller_keeps_the_old_ones_and_the_same_solver():
     controller = Controller(PARAMETERS)
     for name in ("attitude", "imu", "velocity", "position"):
         getattr(controller.estimator, f"add_{name}")(
-            1.0, (0.0, 0.0, 0.0, 1.0) if name == "attitude" else (0.0, 0.0, 5.0 * (name == "position"))
+            1.0,
+            (0.0, 0.0, 0.0, 1.0) if name == "attitude" else (0.0, 0.0, 5.0 * (name == "position")),
         )
     solver, tuning = controller.nmpc.solver, Tuning(PARAMETERS, LEAST)
     before = controller.nmpc._theta.copy()
