@@ -17,7 +17,7 @@ else
 fi
 
 sources="$(find -L src -mindepth 2 -not -path '*/.*' -not -name '*.pyc' -type f \( -name CMakeLists.txt -o -name package.xml \
-  -o -name setup.py -o -name CATKIN_IGNORE -o -name '*.msg' -o -name '*.srv' -o -name '*.action' \
+  -o -name setup.py -o -name CATKIN_IGNORE -o -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name '*.cfg' \
   -o -path '*/nodes/*' -o -path '*/scripts/*' \) -print0 | sort -z | xargs -0 sha256sum)"
 place="$PWD $prefixes_around $beside $(find src -name CATKIN_IGNORE)" # what a build cannot be carried over from
 if [ -f devel/setup.bash ] && [ "$(cat build/.built 2>/dev/null)" = "$place $sources" ]; then

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: MIT
-import dataclasses
 import signal
 import sys
 from pathlib import Path
@@ -81,10 +80,10 @@ def test_thrust_is_not_commanded_through_a_map_of_no_airframe(monkeypatch):
     ros_parameters["~simulated"] = True
     assert guard_node._guard().situation.refusal == ""
 
-    params = dataclasses.replace(guard_node.load_guard_parameters(), vertical_command="velocity")
-    monkeypatch.setattr(guard_node, "load_guard_parameters", lambda: params)
+    ros_parameters["~profile"] = "first_flight"
     ros_parameters["~simulated"] = False
     assert guard_node._guard().situation.refusal == ""  # the first flights' profile needs no map
+    assert guard_node._guard().params.vertical_command == "velocity"
     assert guard_node._guard().params.modes.needs_switch
 
 

@@ -13,6 +13,7 @@ import yaml
 from nmpc_control.errors import ConfigError
 
 T = TypeVar("T")
+PROFILE_PARTS = ("controller", "guard")
 
 
 def config_directory() -> Path:
@@ -69,6 +70,46 @@ def load_yaml(path: Union[str, Path]) -> Dict[str, Any]:
     if not isinstance(data, dict):
         raise ConfigError(str(path), "file", data, "a mapping of keys to values")
     return data
+
+
+def load_profile(name: str, part: str, directory: Path) -> Dict[str, Any]:
+    """Return what ``profiles/<name>.yaml`` changes in a part, ``controller`` or ``guard``.
+
+    No name: nothing.
+
+    Raises:
+        ConfigError: no such profile, or another part in it.
+    """
+    if not name:
+        return {}
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
+        raise ConfigError("profile", "name", name, "small letters, digits and _")
+    path = directory / "profiles" / f"{name}.yaml"
+    data = load_yaml(path)
+    for key in data:
+        if key not in PROFILE_PARTS:
+            raise ConfigError(path.name, key, data[key], f"one of {', '.join(PROFILE_PARTS)}")
+    return data.get(part, {})
+
+
+def overlay(data: Dict[str, Any], changes: Any, source: str, key: str = "") -> Dict[str, Any]:
+    """Return the data with changes laid over them, mapping by mapping.
+
+    Raises:
+        ConfigError: a change is no mapping, or of a key that the data do not have.
+    """
+    if not isinstance(changes, dict):
+        raise ConfigError(source, key or "file", changes, "a mapping of keys to values")
+    result = dict(data)
+    for name, value in changes.items():
+        where = f"{key}.{name}" if key else str(name)
+        if name not in data:
+            raise ConfigError(source, where, value, f"one of the keys {', '.join(data)}")
+        inner = data.get(name)
+        if isinstance(inner, dict):
+            value = overlay(inner, value, source, where)
+        result[name] = value
+    return result
 
 
 def from_dict(cls: Type[T], data: Any, source: str, key: str = "") -> T:

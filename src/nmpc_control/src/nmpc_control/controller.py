@@ -76,9 +76,12 @@ class Controller:
         self._disturbance = DisturbanceEstimate(learnable(parameters.disturbance, vertical_command))
 
     def use(self, parameters: Parameters) -> None:
-        """Take over other weights, limits or margins from the next step on."""
-        self.parameters = parameters
+        """Take over other weights, limits or margins from the next step on.
+
+        Raises ProblemError on unusable numbers; the old parameters remain in force.
+        """
         self.nmpc.use(parameters)
+        self.parameters = parameters
 
     @property
     def disturbance(self) -> np.ndarray:

@@ -78,8 +78,12 @@ class SetpointLimits:
     vertical_velocity: float = field(metadata={"min": 0.0, "max": 5.0})  # [m/s]
 
 
-def attitude_thrust_axes(u: Sequence[float], vehicle: Vehicle, limits: SetpointLimits) -> Axes:
+def attitude_thrust_axes(
+    u: Sequence[float], vehicle: Vehicle, limits: SetpointLimits, gain: float = 1.0
+) -> Axes:
     """Return the five Joy axes that command an input (4,) [m/s^2, rad, rad, rad/s], clamped.
+
+    ``gain`` [1] is what the battery leaves of the thrust of the vehicle's map.
 
     Raises:
         SetpointError: the input is not finite.
@@ -87,7 +91,8 @@ def attitude_thrust_axes(u: Sequence[float], vehicle: Vehicle, limits: SetpointL
     _require_finite(u, 4)
     thrust, roll, pitch, yaw_rate = (float(value) for value in u)
     roll, pitch = _shorten(roll, pitch, min(limits.tilt, vehicle.tilt_limit))
-    percent = _clamp(vehicle.thrust_map.percent(thrust), limits.thrust_min, limits.thrust_max)
+    percent = vehicle.thrust_map.percent(thrust / gain)
+    percent = _clamp(percent, limits.thrust_min, limits.thrust_max)
     axes = (
         roll,
         pitch,
@@ -150,9 +155,11 @@ def checked(axes: Sequence[float], limits: SetpointLimits) -> Axes:
     return tuple(axes)
 
 
-def input_from_axes(axes: Sequence[float], vehicle: Vehicle) -> Tuple[float, float, float, float]:
+def input_from_axes(
+    axes: Sequence[float], vehicle: Vehicle, gain: float = 1.0
+) -> Tuple[float, float, float, float]:
     """Return the input (4,) [m/s^2, rad, rad, rad/s] that attitude and thrust axes command."""
-    return (vehicle.thrust_map.thrust(axes[2]), axes[0], axes[1], axes[3])
+    return (gain * vehicle.thrust_map.thrust(axes[2]), axes[0], axes[1], axes[3])
 
 
 def rc_mode(axes: Sequence[float], switch: Switch) -> RcMode:

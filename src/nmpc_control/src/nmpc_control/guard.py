@@ -70,6 +70,9 @@ class Guard:
         dt, self._t = min(max(i.t - self._t, 0.0), MAX_TICK), i.t
         obstacles = self._field_of(i.obstacles)
         self._learn(i)
+        if i.telemetry.battery_age <= self.params.modes.battery_timeout:
+            commands = self.mode in STREAMING or self.mode is Mode.LANDING
+            self._setpoints.battery.update(i.telemetry.battery, dt, commands)
 
         def brake_clearance() -> float:
             state, when = self._state_in_effect(i), i.t + self.vehicle.delay

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Optional
 
 from nmpc_control.braking import BrakeParameters
-from nmpc_control.config import config_directory, from_dict, load_yaml
+from nmpc_control.config import config_directory, from_dict, load_profile, load_yaml, overlay
 from nmpc_control.dji import SetpointLimits, Switch
 from nmpc_control.link_watch import LinkParameters
 from nmpc_control.mode_inputs import ModeParameters
@@ -41,7 +41,13 @@ class GuardParameters:
     watch: WatchParameters = field()
 
 
-def load_guard_parameters(directory: Optional[Path] = None) -> GuardParameters:
-    """Return the parameters of ``config/guard.yaml``; raises ConfigError."""
-    path = (directory or config_directory()) / "guard.yaml"
-    return from_dict(GuardParameters, load_yaml(path), path.name)
+def load_guard_parameters(directory: Optional[Path] = None, profile: str = "") -> GuardParameters:
+    """Return the parameters of ``config/guard.yaml``; raises ConfigError.
+
+    ``profile`` names a file of ``config/profiles`` whose values win over guard.yaml's.
+    """
+    directory = directory or config_directory()
+    path = directory / "guard.yaml"
+    changes = load_profile(profile, "guard", directory)
+    data = overlay(load_yaml(path), changes, f"{profile}.yaml", "guard")
+    return from_dict(GuardParameters, data, path.name)

@@ -10,7 +10,8 @@ from typing import Optional
 
 import numpy as np
 
-from nmpc_control.config import config_directory, from_dict, load_yaml
+from nmpc_control.battery_thrust import BatteryCurve
+from nmpc_control.config import config_directory, from_dict, load_profile, load_yaml, overlay
 
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97")  # all but the first are HSL
 
@@ -79,6 +80,7 @@ class Vehicle:
     disturbance: np.ndarray = field(  # (3,) [m/s^2] constant acceleration in the world frame
         default_factory=lambda: np.zeros(3), metadata={"length": 3}
     )
+    battery: Optional[BatteryCurve] = None  # what the charge leaves of the thrust; None: all
 
 
 @dataclass(frozen=True)
@@ -228,12 +230,19 @@ def load_weights(name: str, directory: Optional[Path] = None) -> Weights:
 
 
 def load_parameters(
-    vehicle: str = "dji_hil", weights: str = "outdoor", directory: Optional[Path] = None
+    vehicle: str = "dji_hil",
+    weights: str = "outdoor",
+    directory: Optional[Path] = None,
+    profile: str = "",
 ) -> Parameters:
-    """Return the controller's parameters with a vehicle and a weight preset; raises ConfigError."""
+    """Return the controller's parameters with a vehicle and a weight preset; raises ConfigError.
+
+    ``profile`` names a file of ``config/profiles`` whose values win over controller.yaml's.
+    """
     directory = directory or config_directory()
     path = directory / "controller.yaml"
-    data = load_yaml(path)
+    changes = load_profile(profile, "controller", directory)
+    data = overlay(load_yaml(path), changes, f"{profile}.yaml", "controller")
     return from_dict(_File, data, path.name).with_presets(
         load_vehicle(vehicle, directory), load_weights(weights, directory)
     )

@@ -9,12 +9,13 @@ ROS Subscribers:
     nmpc/hold_request (std_msgs/Empty): drop the goal and hold position.
     nmpc/return_request (geometry_msgs/PointStamped): drop the goal and fly there.
     obstacles, nmpc/forget_obstacles: see ``obstacle_port`` and ``obstacle_services``.
-    command/pose (geometry_msgs/PoseStamped): go to this point.
-ROS Action: fly_trajectory (nmpc_msgs/FlyTrajectory). ROS Services: see ``resume_service``.
+    command/pose, command/trajectory: see ``commands``.
+ROS Action: fly_trajectory (nmpc_msgs/FlyTrajectory). ROS Services: see ``resume_service``,
+    ``tuning_port``.
 ROS Publishers: see ``publishers``.
 ROS Parameters:
-    ~vehicle (str): file under config/vehicles. ~weights (str): weight preset, default the
-    scenario's own.
+    ~vehicle (str): file under config/vehicles. ~profile (str): file under config/profiles.
+    ~weights (str): weight preset, default the scenario's own.
     ~scenario (str): name or path of a scenario that is offered beside the named ones.
     ~backend (str): compiled or ipopt. ~avoidance (bool): false removes the obstacle term.
     ~frame_id (str): world frame. ~base_frame (str): body frame, default base_link below the
@@ -31,7 +32,7 @@ from typing import Callable, Deque, Dict, Optional, Tuple
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import PointStamped, PoseStamped
+from geometry_msgs.msg import PointStamped
 from std_msgs.msg import Empty, String
 
 from nmpc_control.controller import Controller
@@ -41,6 +42,7 @@ from nmpc_control.ladder import BRAKES
 from nmpc_control.mode_inputs import FOLLOWED, PLANNED
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters, load_parameters, load_weights
+from nmpc_control.ros.commands import Commands
 from nmpc_control.ros.obstacle_port import ObstaclePort
 from nmpc_control.ros.publishers import Publishers
 from nmpc_control.ros.resume_service import ResumeService
@@ -49,9 +51,10 @@ from nmpc_control.ros.source_switch import follow
 from nmpc_control.ros.state_port import StatePort
 from nmpc_control.ros.subscriptions import Subscriptions
 from nmpc_control.ros.trajectory_action import TrajectoryAction, scenario_of
-from nmpc_control.rotations import rpy_from_quaternion
+from nmpc_control.ros.tuning_port import TuningPort
 from nmpc_control.scenario import Scenario, load_scenario
 from nmpc_control.state import POSITION, YAW
+from nmpc_control.tuning import Tuning
 from nmpc_msgs.msg import ControllerStatus, PositionSource
 
 
@@ -61,7 +64,9 @@ class ControllerNode:
     def __init__(self) -> None:
         self.frame_id = rospy.get_param("~frame_id", "world")
         self.parameters = load_node_parameters()
-        self._vertical_command = load_guard_parameters().vertical_command
+        guard = load_guard_parameters(profile=rospy.get_param("~profile", ""))
+        self._vertical_command = guard.vertical_command
+        self._tuning = Tuning(self.parameters, guard.plan_check.minimum_clearance)
         self.controller = Controller(self.parameters, self._vertical_command)
         self.scenario: Optional[Scenario] = None
         offered = rospy.get_param("~scenario", "")
@@ -79,6 +84,9 @@ class ControllerNode:
             on_goal=lambda: self._request(self._accept_goal),
             on_cancel=lambda: self._request(self._cancel_goal),
         )
+        self._commands = Commands(self.frame_id, lambda: self.controller, self.action, self._show)
+        self._tuning_port = TuningPort(self._tuning, self._request, self._take)
+        self.publishers.add_diagnostics("tuning", self._tuning_port.diagnose)
         if self._offered:
             self._show(self._offered)
 
@@ -168,9 +176,14 @@ class ControllerNode:
 
     def _use(self, scenario: Scenario) -> None:
         weights = rospy.get_param("~weights", "") or scenario.weights
-        self.parameters = replace(self.parameters, weights=load_weights(weights))
-        self.controller.use(self.parameters)
+        self._tuning.use_weights(load_weights(weights), self._take)
+        self._tuning_port.refresh()
         self._show(scenario)
+
+    def _take(self, parameters: Parameters) -> None:
+        """Put parameters into force for the next step; raises ProblemError and leaves the old."""
+        self.controller.use(parameters)
+        self.parameters = parameters
 
     def _show(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -190,27 +203,6 @@ class ControllerNode:
         if estimate is not None:
             self.controller.itinerary.hold(estimate.vector[POSITION], estimate.vector[YAW], message)
         self.action.finish(t, False, message)
-
-    def _go_to(self, t: float, pose: PoseStamped) -> None:
-        q, p = pose.pose.orientation, pose.pose.position
-        target = np.array([p.x, p.y, p.z])
-        estimate = self.controller.estimator.estimate(t)
-        if pose.header.frame_id not in ("", self.frame_id):
-            rospy.logwarn(
-                f"command/pose refused: frame {pose.header.frame_id!r}, expected {self.frame_id!r}"
-            )
-        elif not self._is_inside_fence(target[None]):
-            rospy.logwarn("command/pose refused: the position is not finite or outside the fence")
-        elif estimate is None or not self.controller.engaged:
-            rospy.logwarn("command/pose refused: automatic flight is off, call `start` first")
-        else:
-            x = estimate.vector
-            given = abs(q.x**2 + q.y**2 + q.z**2 + q.w**2 - 1.0) < 0.05
-            yaw = rpy_from_quaternion((q.x, q.y, q.z, q.w))[2] if given else float(x[YAW])
-            if self.controller.itinerary.is_going_to(target):
-                return  # sent again: starting anew each time would never arrive
-            self.action.finish(t, False, "replaced by command/pose")
-            self.controller.itinerary.go_to(t, x[POSITION], x[YAW], target, yaw)
 
     def _return(self, t: float, message: PointStamped) -> None:
         """Fly to where the guard says that automatic flight began."""
@@ -268,7 +260,7 @@ class ControllerNode:
             lambda m: self._request(lambda t: self._return(t, m)),
         )
         listen("nmpc/forget_obstacles", String, lambda m: self._port.forget(m.data), queue_size=10)
-        listen("command/pose", PoseStamped, lambda m: self._request(lambda t: self._go_to(t, m)))
+        self._commands.subscribe(subscriptions, self._request)
 
 
 def load_node_parameters() -> Parameters:
@@ -276,7 +268,8 @@ def load_node_parameters() -> Parameters:
     vehicle = rospy.get_param("~vehicle", "")
     if not vehicle:
         raise ConfigError("parameter", "~vehicle", vehicle, "the name of a file in config/vehicles")
-    parameters = load_parameters(vehicle, rospy.get_param("~weights", "") or "outdoor")
+    weights = rospy.get_param("~weights", "") or "outdoor"
+    parameters = load_parameters(vehicle, weights, profile=rospy.get_param("~profile", ""))
     backend = rospy.get_param("~backend", parameters.solver.backend)
     if backend not in ("compiled", "ipopt"):
         raise ConfigError("parameter", "~backend", backend, "compiled or ipopt")

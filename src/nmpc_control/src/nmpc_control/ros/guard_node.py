@@ -10,7 +10,7 @@ ROS Publishers:
 ROS Services: start, hover, land, release (std_srvs/Trigger), answered with a reason in words;
     those of ``obstacle_services`` and ``source_switch``.
 ROS Parameters:
-    ~vehicle (str): file under config/vehicles.
+    ~vehicle (str): file under config/vehicles. ~profile (str): file under config/profiles.
     ~avoidance (bool): false leaves obstacles out of the plan check.
     ~simulated (bool): a simulator is flown: its thrust map counts, its RC stands in F already.
     ~frame_id (str): world frame, instead of the one in ``config/guard.yaml``.
@@ -232,9 +232,10 @@ def main() -> None:
 
 
 def _guard() -> Guard:
-    params = load_guard_parameters()
+    profile = rospy.get_param("~profile", "")
+    params = load_guard_parameters(profile=profile)
     params = replace(params, world_frame=rospy.get_param("~frame_id", params.world_frame))
-    parameters = load_parameters(_vehicle_name())
+    parameters = load_parameters(_vehicle_name(), profile=profile)
     simulated = bool(rospy.get_param("~simulated", False))
     if simulated:
         params = replace(params, modes=replace(params.modes, needs_switch=False))

@@ -5,6 +5,7 @@ import io
 import json
 from typing import List, Optional, Tuple
 
+import numpy as np
 import yaml
 
 from nmpc_control.analysis.identification.attitude import AXES, LIMIT
@@ -12,9 +13,12 @@ from nmpc_control.analysis.identification.drag import mean_drag
 from nmpc_control.analysis.identification.identify import Identification
 from nmpc_control.analysis.identification.thrust import VERTICAL
 from nmpc_control.analysis.messages import text
+from nmpc_control.battery_thrust import LEAST, MOST
 from nmpc_control.config import from_dict
 from nmpc_control.params import Lag, Vehicle
+from nmpc_control.state import GRAVITY
 
+_CHARGES = 4  # points of the battery's curve
 _SHORTEST_LAG = 0.02  # [s] of the yaw rate, where the dead time of all inputs takes most of it
 
 Line = Tuple[str, str]  # key and value, comment
@@ -45,6 +49,7 @@ def vehicle_yaml(
         _delay(found, base),
         _tilt_limit(found, base, kept),
         *_thrust_map(found, base, airframe, kept),
+        *_battery(found),
     ]
     bags = ", ".join(text(bag) for bag in found.bags)
     head = f"# Identified from {bags}; source: {found.source} (doc/identification.md).\n"
@@ -146,6 +151,28 @@ def _thrust_map(
         (f"  minimum: {measured.minimum:.4g}", f"[percent] of {base.name}"),
         (f"  maximum: {measured.maximum:.4g}", f"[percent] of {base.name}"),
         ("  measured_on: " + json.dumps(text(origin)), why),
+    ]
+
+
+def _battery(found: Identification) -> List[Line]:
+    """Return what the charge leaves of the thrust, where the flights discharged far enough."""
+    thrust_map, slope, levels = found.thrust.map, found.battery.slope, found.battery.levels
+    if thrust_map is None or slope is None or not levels:
+        return []
+    charges = np.array([level["battery_percent"] for level in levels])
+    samples = [level["samples"] for level in levels]
+    mean = float(np.average(charges, weights=samples))
+    mapped = found.thrust.estimate.values.get("charge_percent") or mean
+    at = np.linspace(charges.min(), charges.max(), _CHARGES)
+    hover = (GRAVITY - thrust_map.offset) / thrust_map.slope + slope * (at - mapped)
+    gain = np.clip(GRAVITY / thrust_map.thrust(hover), LEAST, MOST)
+    return [
+        ("battery:", ""),
+        ("  charge: [" + ", ".join(f"{c / 100.0:.3f}" for c in at) + "]", "[1]"),
+        (
+            "  gain: [" + ", ".join(f"{g:.4f}" for g in gain) + "]",
+            f"[1] hover thrust moved by {slope:.3f} percent per percent of charge",
+        ),
     ]
 
 
