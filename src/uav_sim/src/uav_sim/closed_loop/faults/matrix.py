@@ -42,6 +42,7 @@ class Case:
     watch: float  # [s] for which the flight goes on
     level: str  # of disturbance
     situations: Tuple[str, ...]
+    is_pair: bool = False
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ def _pair(name: str, item: Mapping[str, Any], cases: Mapping[str, Case], source:
     when = f" {after:g} s later" if after else ""
     words = f"{first.words};{when} {second.words}"
     situations = _situations([item["situation"]], place)
-    return Case(name, words, (*first.parts, *late), watch, level, situations)
+    return Case(name, words, (*first.parts, *late), watch, level, situations, is_pair=True)
 
 
 def _part(item: Mapping[str, Any], source: str) -> Part:
