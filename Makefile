@@ -7,16 +7,20 @@ export PLANT ?= dji_hil
 export SPEED ?= 1.0
 SOAK_MINUTES ?= 10
 RVIZ ?=
+ONLY ?=
+HOURS ?= 5
 in_workspace := . devel/setup.bash &&
 single_thread := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 two_workers := -n 2 --dist loadscope
 
-.PHONY: help build fly bench soak test test-long lint clean
+.PHONY: help build fly bench soak faults fuzz test test-long lint clean
 
 help:
 	@echo "make fly [SCENARIO=multi_obstacle] [PLANT=dji_hil] [SPEED=1.0] [RVIZ=1]   fly in the simulator, record, report"
 	@echo "make bench [BENCH_ARGS=...]   performance tables, build/bench.json, figures; ten minutes (--quick: one)"
 	@echo "make soak [SOAK_MINUTES=10]   a long flight on a busy machine: jitter, memory, markers; build/soak.json"
+	@echo "make faults [ONLY=WORD]   what may go wrong, in three situations each, without ROS: table, build/faults.json; some minutes"
+	@echo "make fuzz [HOURS=5]   random stories around the guard, so many simulated hours; ends at the first in which something must not happen"
 	@echo "make test [PYTEST_ARGS=...]   everything that continuous integration runs"
 	@echo "make test-long   the tests that take too long for it: traffic, floods of obstacles, motion capture, laser"
 	@echo "make build   system packages, Python packages and the workspace, as far as they are missing"
@@ -36,6 +40,12 @@ bench: build
 
 soak: build
 	@$(in_workspace) $(single_thread) .venv/bin/python3 -m uav_sim.closed_loop.soak --minutes $(SOAK_MINUTES)
+
+faults: build
+	@$(in_workspace) $(single_thread) .venv/bin/python3 -m uav_sim.closed_loop.faults --json build/faults.json $(if $(ONLY),--only "$(ONLY)")
+
+fuzz: build
+	@$(in_workspace) $(single_thread) PYTHONPATH="$$PYTHONPATH:tests/unit" .venv/bin/python3 tests/unit/guard_fuzz.py "$(HOURS)"
 
 test: lint
 	@$(single_thread) .setup/python38.sh

@@ -11,6 +11,7 @@ setup(
             "uav_sim.closed_loop",
             "uav_sim.closed_loop.bench",
             "uav_sim.closed_loop.campaign",
+            "uav_sim.closed_loop.faults",
             "uav_sim.closed_loop.replay",
             "uav_sim.closed_loop.soak",
             "uav_sim.faults",

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Random stories around the guard: whatever is heard, asked or planned, some things never happen.
 
-``--hypothesis-profile`` or ``settings`` decide how long; the default is short.
+GUARD_EXAMPLES decides how many here, a few by default; ``make fuzz HOURS=5`` goes on for hours of
+simulated time (``guard_fuzz.py``).
 """
 
 import dataclasses
@@ -75,6 +76,8 @@ def old(t, x):
 class Story(RuleBasedStateMachine):
     """Ticks of a guard between which anything may change."""
 
+    ticks = 0  # of all stories so far
+
     @initialize(in_air=st.booleans())
     def begin(self, in_air):
         aircraft = Aircraft().airborne([0.0, 0.0, 5.0]) if in_air else Aircraft()
@@ -137,6 +140,7 @@ class Story(RuleBasedStateMachine):
         for _, inputs, output in self.flight.log[self.seen :]:
             self.check_tick(self.mode, inputs.telemetry, output)
             self.mode = output.mode
+        Story.ticks += len(self.flight.log) - self.seen
         self.seen = len(self.flight.log)
 
     def check_tick(self, before, telemetry, output):

@@ -14,11 +14,11 @@ from typing import Any, Callable, Deque, Dict, Optional, Tuple
 
 import numpy as np
 
+from nmpc_control.controller import Step
 from nmpc_control.guard_data import Action, GuardOutput
 from uav_sim.closed_loop.loop import ClosedLoop, hear
 
 STATE = ("attitude", "imu", "velocity", "local_position")
-_TO_CONTROLLER = (Action.HOLD, Action.RETURN)
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,8 @@ class LinkedLoop(ClosedLoop):
                 deliver()
         super().step()
 
-    def _hear(self, topic: str, t: float, value: Any) -> None:
+    def hear(self, topic: str, t: float, value: Any) -> None:
+        """Hand the state to the guard at once, and to the controller over the link."""
         controller, guard = self.sources
 
         def at_the_workstation() -> None:
@@ -106,26 +107,23 @@ class LinkedLoop(ClosedLoop):
         if topic in STATE:
             self._send_by(topic, at_the_workstation)
 
-    def _solve(self) -> None:
-        step = self.controller.step(self.controller_time)
-        if step is None:
-            return
+    def deliver(self, step: Step) -> None:
+        """Send a plan to the guard."""
         step = replace(step, plan=replace(step.plan, state_t=self._newest))
         self._send_by("plan", lambda: self.inbox.add_plan(step.plan, step.goal))
         if self.controller.itinerary.clock_start is not None:
             self.log.clock_start = self.controller.itinerary.clock_start - self.link.skew
         self.log.steps.append(step)
 
-    def _tell(self, t: float, output: GuardOutput) -> None:
-        tell = super()._tell
-        self._send_by("status", lambda: tell(t, output))
+    def report(self, t: float, output: GuardOutput) -> None:
+        """Send the controller what the guard did."""
+        report = super().report
+        self._send_by("status", lambda: report(t, output))
 
-    def _act(self, action: Action, output: GuardOutput) -> None:
-        act = super()._act
-        if action in _TO_CONTROLLER:
-            self._send_by("request", lambda: act(action, output))
-        else:
-            act(action, output)
+    def tell(self, action: Action, output: GuardOutput) -> None:
+        """Send the controller what it is to do."""
+        tell = super().tell
+        self._send_by("request", lambda: tell(action, output))
 
     def _send_by(self, topic: str, deliver: Callable[[], None]) -> None:
         if topic not in self._channels:

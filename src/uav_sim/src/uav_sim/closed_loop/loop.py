@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
 """Controller, guard and simulated aircraft on one clock, without ROS."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import numpy as np
 
 from nmpc_control.controller import Controller, Step
+from nmpc_control.dji import Axes, Task
 from nmpc_control.guard import Guard
-from nmpc_control.guard_data import Action, GuardOutput
+from nmpc_control.guard_data import Action, GuardInputs, GuardOutput
 from nmpc_control.guard_inbox import GuardInbox
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.ladder import BRAKES
@@ -23,12 +25,14 @@ from uav_sim.disturbance import Disturbance
 from uav_sim.errors import SimulatorError
 from uav_sim.m100 import SimulatedM100, Truth
 from uav_sim.preset import PlantPreset
+from uav_sim.telemetry import Packet
 from uav_sim.world import World
 
 OBSTACLE_PERIOD = 0.1  # [s] between two lists of sensed obstacles
 _START_TIMEOUT = 30.0  # [s] from the first packet to automatic flight
 _AFTER_ARRIVAL = 1.0  # [s] of hover that is still recorded
 _GENERIC = "generic"
+_TASKS = {Action.TAKE_OFF: Task.TAKE_OFF, Action.LAND: Task.LAND}
 _SWITCH_TO_F = 0.1  # [s] when the pilot hands over: the guard must see the switch move
 
 
@@ -54,6 +58,10 @@ class ClosedLoop:
     Its position comes from motion capture where the disturbance has it, else from GPS, unless
     ``sources`` says otherwise. Obstacles that move, or drift with the position, are handed over as
     sensed, at 10 Hz.
+
+    Its joints, for whoever wants something between the parts: ``now``, ``controller_time``,
+    ``heard``, ``receive``, ``hear``, ``look``, ``solve``, ``deliver``, ``tick``, ``judge``,
+    ``send``, ``act``, ``tell``, ``call``, ``report``.
     """
 
     def __init__(
@@ -89,30 +97,40 @@ class ClosedLoop:
         return self.aircraft.t
 
     @property
-    def controller_time(self) -> float:
-        """Simulated time [s] by the controller's clock."""
+    def now(self) -> float:
+        """Time [s] on the clock of the onboard computer."""
         return self.t
+
+    @property
+    def controller_time(self) -> float:
+        """Time [s] on the clock of the computer on which the controller runs."""
+        return self.now
 
     def step(self) -> None:
         """Advance by one step: telemetry, solve when due, guard when due, aircraft."""
-        for packet in self.aircraft.step():
-            self._receive(packet.topic, packet.t, packet.value)
+        for packet in self.heard():
+            self.receive(packet.topic, packet.t, packet.value)
         for pose in self.aircraft.new_poses:
             for sources in self.sources:
                 sources.add_pose(*pose)
         if self.senses and self._count % self._looks == 0:
-            self._look()
+            self.look()
         self._count += 1
         if self._count == self._handover:
             self.aircraft.rc.mode = "F"
         if self._count % self._solves == 0:
-            self._solve()
+            self.solve()
         if self._count % self._ticks == 0:
-            self._tick()
+            self.tick()
             self.log.truths.append(self.aircraft.truth)
 
-    def _receive(self, topic: str, t: float, value: Any) -> None:
-        self._hear(topic, t, value)
+    def heard(self) -> List[Packet]:
+        """Advance the aircraft by one step; return the telemetry that came in it."""
+        return self.aircraft.step()
+
+    def receive(self, topic: str, t: float, value: Any) -> None:
+        """Take a value of ``dji_sdk``'s telemetry, stamped ``t`` [s]."""
+        self.hear(topic, t, value)
         timed: Dict[str, Callable[[float, Any], None]] = {
             "rc": self.inbox.add_rc,
             "flight_status": self.inbox.add_flight_status,
@@ -124,39 +142,44 @@ class ClosedLoop:
         elif topic == "height_above_takeoff":
             self.inbox.add_height(value)
 
-    def _hear(self, topic: str, t: float, value: Any) -> None:
+    def hear(self, topic: str, t: float, value: Any) -> None:
+        """Hand the aircraft's state to controller and guard."""
         for sources in self.sources:
             hear(sources, topic, t, value)
 
-    def _look(self) -> None:
+    def look(self) -> None:
+        """Hand over the obstacles as they are sensed now."""
         sensed = [_known(state, self.t) for state in self.aircraft.sensed_obstacles]
         self.controller.obstacles = self.inbox.obstacles = tuple(sensed)
         if self.aircraft.world.moves:
             self.log.obstacles.append((self.t, self.aircraft.world.states()))
 
-    def _solve(self) -> None:
-        step = self.controller.step(self.t)
-        if step is None:
-            return
-        self._send(step)
+    def solve(self) -> None:
+        """Let the controller do one step, and deliver its plan."""
+        step = self.controller.step(self.controller_time)
+        if step is not None:
+            self.deliver(step)
+
+    def deliver(self, step: Step) -> None:
+        """Hand a plan to the guard."""
+        self.inbox.add_plan(step.plan, step.goal)
         if self.controller.itinerary.clock_start is not None:
             self.log.clock_start = self.controller.itinerary.clock_start
         self.log.steps.append(step)
 
-    def _send(self, step: Step) -> None:
-        self.inbox.add_plan(step.plan, step.goal)
-
-    def _tick(self) -> None:
+    def tick(self) -> None:
+        """Let the guard act once; its setpoint leaves, its actions are carried out."""
         self.inbox.needs_gps = self.sources[1].active == GPS
-        output = self.guard.tick(self.inbox.inputs(self.t))
-        for action in output.actions:
-            self._act(action, output)
+        yaw = self.sources[1].yaw_disagreement(self.now)
+        self.inbox.yaw_disagreement = math.nan if yaw is None else yaw
+        output = self.judge(self.inbox.inputs(self.now, self.t))
+        self.act(output)
         if output.axes is not None:
-            self.aircraft.setpoint(_GENERIC, output.axes)
-        self._tell(self.t, output)
+            self.send(output.axes)
+        self.report(self.now, output)
         self.log.outputs.append((self.t, output))
 
-    def _tell(self, t: float, output: GuardOutput) -> None:
+    def report(self, t: float, output: GuardOutput) -> None:
         """Have the controller know what the guard did at ``t`` [s], as by its status."""
         known = output.axes is not None and output.applied is not None
         self.controller.record_input(t, np.array(output.applied) if known else None)
@@ -165,26 +188,46 @@ class ClosedLoop:
         self.controller.held_back = output.mode in PLANNED and output.rung in BRAKES
         self.controller.manual = output.mode in FOLLOWED
 
-    def _act(self, action: Action, output: GuardOutput) -> None:
-        if action is Action.OBTAIN_AUTHORITY:
-            self.inbox.authority = self.aircraft.control_authority(True).result
-        elif action is Action.RELEASE_AUTHORITY:
-            self.aircraft.control_authority(False)
-            self.inbox.authority = False
-        elif action is Action.TAKE_OFF:
-            self.aircraft.task(4)
-        elif action is Action.LAND:
-            self.aircraft.task(6)
-        elif action is Action.SET_REFERENCE:
-            self.aircraft.set_local_position_reference()
-        elif action is Action.HOLD:
-            x = self.controller.estimator.estimate(self.controller_time).vector
-            self.controller.itinerary.hold(x[:3], x[5])
-        elif action is Action.RETURN:
-            x = self.controller.estimator.estimate(self.controller_time).vector
-            self.controller.itinerary.go_to(
-                self.controller_time, x[:3], x[5], np.array(output.target), x[5]
-            )
+    def judge(self, inputs: GuardInputs) -> GuardOutput:
+        """Return what the guard decides."""
+        return self.guard.tick(inputs)
+
+    def send(self, axes: Axes) -> None:
+        """Let a setpoint leave for the aircraft."""
+        self.aircraft.setpoint(_GENERIC, axes)
+
+    def act(self, output: GuardOutput) -> None:
+        """Carry out what the guard asks for beside its setpoint."""
+        for action in output.actions:
+            if action in (Action.HOLD, Action.RETURN):
+                self.tell(action, output)
+            elif action is Action.OBTAIN_AUTHORITY:
+                self.inbox.authority = self.call(action)
+            else:
+                self.call(action)
+                if action is Action.RELEASE_AUTHORITY:
+                    self.inbox.authority = False
+
+    def tell(self, action: Action, output: GuardOutput) -> None:
+        """Tell the controller to hold, or to return."""
+        now, itinerary = self.controller_time, self.controller.itinerary
+        estimate = self.controller.estimator.estimate(now)
+        if estimate is None:
+            return
+        x = estimate.vector
+        if action is Action.HOLD:
+            itinerary.hold(x[:3], x[5])
+        elif output.target is not None:
+            itinerary.go_to(now, x[:3], x[5], np.array(output.target), x[5])
+
+    def call(self, action: Action) -> bool:
+        """Call the service of dji_sdk that an action needs; return whether it was granted."""
+        aircraft = self.aircraft
+        if action is Action.SET_REFERENCE:
+            return aircraft.set_local_position_reference()
+        if action in _TASKS:
+            return aircraft.task(int(_TASKS[action])).result
+        return aircraft.control_authority(action is Action.OBTAIN_AUTHORITY).result
 
 
 def fly(

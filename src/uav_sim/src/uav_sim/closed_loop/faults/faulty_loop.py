@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: MIT
+"""A closed loop with troubles at its joints, and with what the two nodes do about them.
+
+What the nodes add to controller and guard is repeated here as briefly as it can be: an exception
+ends no loop, a clock that steps back begins anew, services are called beside the stream, stamps
+from the future count as now, and obstacles are remembered.
+"""
+
+import math
+from typing import Any, List, Optional, Tuple
+
+from nmpc_control.controller import Controller, Step
+from nmpc_control.dji import Axes, RcMode, rc_mode
+from nmpc_control.guard_data import Action, GuardInputs, GuardOutput
+from nmpc_control.guard_inbox import GuardInbox
+from nmpc_control.obstacle_memory import ObstacleMemory
+from nmpc_control.obstacle_params import load_obstacle_parameters
+from nmpc_control.obstacle_sighting import Sighting, fault
+from uav_sim.body import BodyState
+from uav_sim.closed_loop.faults.service_calls import ServiceCalls
+from uav_sim.closed_loop.faults.trouble import Trouble
+from uav_sim.closed_loop.loop import ClosedLoop
+from uav_sim.telemetry import Packet
+
+CLOCK_STEP = 0.1  # [s] back that count as a jump, as in the guard's node
+HEAR_AGAIN = 0.1  # [s] for telemetry after one, the same
+SENDER = "simulator"
+
+
+class FaultyLoop(ClosedLoop):
+    """One flight; ``troubles`` are those that act now."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.senses = True
+        self.troubles: List[Trouble] = []
+        self.sent: List[Tuple[float, Axes]] = []  # [s] true time, what left for the aircraft
+        self.escape: Optional[Axes] = None  # sent in place of what the guard decides
+        self.pilot_heard: Optional[float] = None  # [s] when the switch was first heard to leave F
+        parameters = load_obstacle_parameters()
+        self._memories = (ObstacleMemory(parameters), ObstacleMemory(parameters))
+        self._calls = ServiceCalls(self._try, self._call_time, self._set_authority, self._fail)
+        self._posted: List[Step] = []
+        self._ticked = self._solved = -math.inf  # [s] on the computer's clock
+        self._deaf_until = -math.inf  # [s]
+
+    @property
+    def now(self) -> float:
+        """Time [s] on the clock of the onboard computer."""
+        return self.t + sum(trouble.clock() for trouble in self.troubles)
+
+    def step(self) -> None:
+        """Advance by one step, and let calls and plans go on their way."""
+        super().step()
+        self._calls.step(self.t)
+        steps, self._posted = self._posted, []
+        for trouble in self.troubles:
+            steps = trouble.deliver(self.t, steps)
+        for step in steps:
+            super().deliver(step)
+
+    def heard(self) -> List[Packet]:
+        """Advance the aircraft by one step; return what is heard of it."""
+        packets = super().heard()
+        for trouble in self.troubles:
+            packets = trouble.hear(self.t, packets)
+        return packets
+
+    def receive(self, topic: str, t: float, value: Any) -> None:
+        """Take a value stamped by this computer."""
+        if topic == "rc" and rc_mode(value, self.guard.params.rc_switch) is not RcMode.F:
+            self.pilot_heard = self.pilot_heard or self.t
+        super().receive(topic, min(t + self.now - self.t, self.now), value)
+
+    def look(self) -> None:
+        """Let both memories hear the list of obstacles."""
+        now = self.now
+        listed: Optional[List[Sighting]] = [
+            _sighting(state, now) for state in self.aircraft.sensed_obstacles
+        ]
+        for trouble in self.troubles:
+            listed = None if listed is None else trouble.sight(listed)
+        if listed is not None:
+            judged = [(s, fault(s)) for s in listed]
+            for memory in self._memories:
+                memory.hear(now, SENDER, judged)
+
+    def solve(self) -> None:
+        """Let the controller do one step; one that raises is reported by its node, no more."""
+        if self.now < self._solved - 1e-9:
+            self.controller = Controller(
+                self.controller.parameters, self.guard.params.vertical_command
+            )
+            self.sources[0].forget(self.controller.estimator)
+            self._memories[0].start_anew()
+        self._solved = self.now
+        self.controller.obstacles = self._memories[0].obstacles(self.now)
+
+        def think() -> Optional[Step]:
+            return self.controller.step(self.now)
+
+        for trouble in self.troubles:
+            think = _around(trouble, self.t, think)
+        try:
+            step = think()
+        except RuntimeError:
+            self.controller.nmpc.reset()
+            return
+        if step is not None:
+            self._posted.append(step)
+
+    def tick(self) -> None:
+        """Let the guard act if its process runs and has heard enough."""
+        if self.escape is not None:
+            super().send(self.escape)
+            return
+        if not all(trouble.runs(self.t) for trouble in self.troubles) or self.t < self._deaf_until:
+            return
+        if self.now < self._ticked - CLOCK_STEP:
+            self._ticked, self._deaf_until = self.now, self.t + HEAR_AGAIN
+            authority, self.inbox = self.inbox.authority, GuardInbox(self.guard.params)
+            self.inbox.authority = authority
+            self.sources[1].forget(self.inbox.estimator)
+            self._memories[1].start_anew()
+            return
+        self._ticked = max(self.now, self._ticked)
+        memory = self._memories[1]
+        self.inbox.obstacles = memory.obstacles(self.now)
+        self.inbox.obstacles_stale = memory.stale(self.now)
+        super().tick()
+
+    def judge(self, inputs: GuardInputs) -> GuardOutput:
+        """Return what the guard decides, or what it falls back to where it fails."""
+        try:
+            for trouble in self.troubles:
+                trouble.before_judgement()
+            return self.guard.tick(inputs)
+        except Exception as error:  # noqa: BLE001 (as in its node: the aircraft is in the air)
+            return self.guard.give_way(inputs.t, inputs.telemetry, error)
+
+    def send(self, axes: Axes) -> None:
+        """Let a setpoint leave, and remember it."""
+        self.sent.append((self.t, axes))
+        super().send(axes)
+
+    def act(self, output: GuardOutput) -> None:
+        """Order calls of services, do the rest at once."""
+        if Action.RELEASE_AUTHORITY in output.actions:
+            self.inbox.authority = False
+        told = (Action.HOLD, Action.RETURN)
+        self._calls.order([action for action in output.actions if action not in told])
+        for action in output.actions:
+            if action in told:
+                self.tell(action, output)
+
+    def _try(self, action: Action) -> bool:
+        refused = any(trouble.refuses(action) for trouble in self.troubles)
+        return not refused and self.call(action)
+
+    def _call_time(self, action: Action) -> float:
+        return max((trouble.call_time(action) for trouble in self.troubles), default=0.0)
+
+    def _set_authority(self, is_held: bool) -> None:
+        self.inbox.authority = is_held
+
+    def _fail(self, sentence: str) -> None:
+        self.inbox.failure = sentence
+
+
+def _around(trouble: Trouble, t: float, think: Any) -> Any:
+    return lambda: trouble.solve(t, think)
+
+
+def _sighting(state: BodyState, t: float) -> Sighting:
+    obstacle, position, velocity = state
+    return Sighting(
+        id=obstacle.id,
+        shape=obstacle.shape,
+        size=tuple(obstacle.size),
+        position=tuple(position),
+        velocity=tuple(velocity),
+        stamp=t,
+    )
