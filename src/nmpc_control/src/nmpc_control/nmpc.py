@@ -23,8 +23,8 @@ from nmpc_control.state import GRAVITY, POSITION, VELOCITY, Plan, hover_input
 _SOON = 2.0  # [s] ahead in which a plan that goes on makes headway
 _NO_HEADWAY = 0.3  # [m], [m/s]
 _LEAST_PACE = 1.0  # [m/s]
-_BRISK = 1.3  # [1] times the reference's speed is no haste yet
-_HASTE, _MOST_HASTE = 0.05, 0.15  # [s], [m]: at full tilt nothing is left to correct with
+_BRISK = 1.2  # [1] times the reference's speed is no haste yet
+_HASTE, _MOST_HASTE = 0.08, 0.2  # [s], [m]: at full tilt nothing is left to correct with
 _SLOWER = 0.3  # [m/s] at once, where it is too fast already
 _NAMED = 3  # obstacles in a sentence
 
