@@ -17,6 +17,7 @@ from xmlrpc.client import Error, ServerProxy
 import rospy
 from guard_client import MODES, Client
 from sensor_msgs.msg import Joy
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from nmpc_control.ros.known_service import KnownService
@@ -173,11 +174,11 @@ def authority_taken(client):
 
 
 def app_takes_authority(client):
-    """A mobile app takes authority in flight, and no topic shows it."""
+    """A mobile app takes authority in flight for a moment, and no topic shows it."""
     client.go_to(client.position[0] + 12.0, 0.0, 3.0)
     client.wait("FLYING")
     rospy.sleep(1.5)
-    return client.fault("authority_taken", "{by: app}", 4.0, ())
+    return client.fault("authority_taken", "{by: app}", 1.2, ())
 
 
 def solver_stalls(client):
@@ -257,6 +258,34 @@ def master_ends(client):
     client.wait("HOVERING", 30.0)
     seen["codes"] = list(dict.fromkeys(s.reason_code for s in client.statuses[since:]))
     return seen
+
+
+def link(client, bad, seconds, good):
+    """What lies between guard and controller changes for some seconds (``link_relay.py``)."""
+    settings = rospy.Publisher("link", String, queue_size=5)
+    client.wait_for(lambda: settings.get_num_connections() > 0)
+    since = len(client.statuses)
+    settings.publish(json.dumps(bad))
+    seen = client.report(since, seconds)
+    settings.publish(json.dumps(good))
+    client.settle()
+    seen["then"] = client.report(since, 0.2)["modes"]
+    return seen
+
+
+def link_slow(client):
+    """From telemetry to plan it takes 0.8 s."""
+    return link(client, {"delay": 0.4}, 2.5, {"delay": 0.005})
+
+
+def link_cut(client):
+    """Nothing comes through for 1.5 s, then all of it at once."""
+    return link(client, {"up": False}, 1.5, {"up": True})
+
+
+def link_skewed(client, skew):
+    """The workstation's clock is set wrong."""
+    return link(client, {"skew": float(skew)}, 2.5, {"skew": 0.0})
 
 
 def main():

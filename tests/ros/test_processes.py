@@ -102,7 +102,7 @@ def test_every_process_every_way(ros):
         "attitude_silent": (["HOVERING", "RELEASED"], "attitude_stale"),
         "rc_silent": (["HOVERING", "MANUAL"], "pilot"),
         "authority_taken": (["HOVERING", "MANUAL"], "pilot"),
-        "app_takes_authority": (["FLYING", "BRAKING", "RELEASED"], "authority_lost"),
+        "app_takes_authority": (["FLYING", "BRAKING"], "no_effect"),
         "solver_stalls": (["HOVERING", "BRAKING"], "no_plan"),
     }
     for name, (modes, code) in expected.items():
@@ -133,7 +133,7 @@ def test_every_process_every_way(ros):
 
     for number in ("SIGSEGV", "SIGKILL"):
         seen = flight.sees(f"guard_ends:{number}")[f"guard_ends:{number}"]
-        assert seen["modes"] == ["FLYING"] and seen["silent"] and not seen["back"], seen
+        assert seen["modes"] in ([], ["FLYING"]) and seen["silent"] and not seen["back"], seen
         assert seen["stream_ms"] < 100.0 + seen["bare_gap_ms"]
         assert seen["setpoints"][-1] == ATTITUDE
         assert seen["moved"] < 8.0, "the flight controller did not brake"

@@ -109,7 +109,7 @@ class LinkedLoop(ClosedLoop):
 
     def deliver(self, step: Step) -> None:
         """Send a plan to the guard."""
-        step = replace(step, plan=replace(step.plan, state_t=self._newest))
+        step = replace(step, plan=replace(step.plan, state_t=self._newest, solve_time=0.0))
         self._send_by("plan", lambda: self.inbox.add_plan(step.plan, step.goal))
         if self.controller.itinerary.clock_start is not None:
             self.log.clock_start = self.controller.itinerary.clock_start - self.link.skew

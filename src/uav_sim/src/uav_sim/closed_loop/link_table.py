@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What the link to a controller on the ground may be like: flights over worse and worse ones.
 
-``python -m uav_sim.closed_loop.link_table [SCENARIO] [--json FILE]``: one row a flight, without ROS.
+One row a flight, without ROS: ``python -m uav_sim.closed_loop.link_table [SCENARIO] [--json F]``.
 """
 
 import argparse
@@ -19,7 +19,6 @@ from nmpc_control.ladder import BRAKES
 from nmpc_control.mode_inputs import Mode
 from nmpc_control.params import load_parameters
 from nmpc_control.scenario import Scenario, load_scenario
-from nmpc_control.state import POSITION
 from uav_sim.closed_loop.flight_record import world_of
 from uav_sim.closed_loop.link import LinkedLoop, LinkQuality
 from uav_sim.closed_loop.loop import Log, NoFlightError, fly
@@ -77,10 +76,10 @@ def row(scenario: Scenario, link: LinkQuality, plant: str = "dji_hil") -> Dict[s
     deviation = deviations(scenario, log)
     flown = [output for t, output in log.outputs if log.clock_start and t >= log.clock_start]
     held = sum(o.mode is Mode.BRAKING or o.rung in BRAKES for o in flown)
-    arrived = loop.controller.itinerary.outcome
+    outcome = loop.controller.itinerary.outcome
     return {
         **found,
-        "arrived": bool(arrived and arrived[0]),
+        "arrived": bool(outcome and outcome.arrived),
         "reason": loop.log.outputs[-1][1].reason,
         "deviation_mean_m": float(deviation.mean()),
         "deviation_max_m": float(deviation.max()),
@@ -103,8 +102,8 @@ def deviations(scenario: Scenario, log: Log) -> np.ndarray:
 def table(rows: List[Dict[str, Any]]) -> str:
     """Return the rows as a table in Markdown."""
     head = (
-        "| one way [ms] | jitter [ms] | loss [%] | skew [ms] | telemetry to plan [ms] | "
-        "deviation mean, max [m] | braking [% of the time] | arrived |\n|---|---|---|---|---|---|---|---|"
+        "| one way [ms] | jitter [ms] | loss [%] | skew [ms] | telemetry to plan [ms] "
+        "| deviation mean, max [m] | braking [% of the time] | arrived |\n" + 8 * "|---" + "|"
     )
     return "\n".join([head, *map(_line, rows)])
 
