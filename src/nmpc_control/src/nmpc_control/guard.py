@@ -61,6 +61,11 @@ class Guard:
         self._reference_asked = -math.inf
         self._forget(-math.inf)
 
+    @property
+    def battery_gain(self) -> float:
+        """What the battery leaves of the thrust of the vehicle's map [1], as commanded with."""
+        return self._setpoints.battery.gain
+
     def tick(self, i: GuardInputs) -> GuardOutput:
         """Return the setpoint, the mode and what is to be done at time ``i.t``."""
         if i.t < self._t:
