@@ -243,7 +243,9 @@ class Guard:
     ) -> Command:
         if self.mode in PLANNED and not override:
             plan = self.ladder.plan
-            up = float(plan.state_at(i.t + plan.delay)[VELOCITY][2])
+            # the flight controller's own loop lags: what is asked for now is there that much later
+            ahead = i.t + plan.delay + self.params.vertical_lead
+            up = float(plan.state_at(ahead)[VELOCITY][2])
             return self._setpoints.of_input(rung, plan.input_at(i.t), up)
         # until DJI's own landing has begun: silence while a service call blocks is nobody's control
         awaits_landing = self.mode is Mode.LANDING and seen.in_air
