@@ -44,7 +44,7 @@ def flown(knows, plant="dji_hil", percent=LOW, drain=1.0, seconds=8.0):
         loop.step()
         assert loop.t < 20.0, loop.log.outputs[-1][1].reason
     loop.began = loop.t
-    loop.gain = loop.guard._setpoints.battery.gain  # as the start found it
+    loop.gain = loop.guard.battery_gain  # as the start found it
     while loop.t < loop.began + seconds:
         loop.step()
     return loop

@@ -69,10 +69,14 @@ class Client:
             message.points.append(
                 MultiDOFJointTrajectoryPoint([place], [], [], rospy.Duration.from_sec(t))
             )
-        count = len(self.answers)
+
+        def answers():
+            return [text for text in self.answers if text.startswith("command/trajectory")]
+
+        count = len(answers())
         self.trajectory.publish(message)
-        self.until(lambda: len(self.answers) > count, "answer")
-        return self.answers[-1]
+        self.until(lambda: len(answers()) > count, "answer")
+        return answers()[-1]
 
 
 def asks():

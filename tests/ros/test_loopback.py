@@ -49,6 +49,7 @@ def test_simulator_and_tests_listen_on_loopback_alone(ros):
     assert {name for name, where in seen.items() if where != {True}} <= ROSCPP
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("reachable", [False, True], ids=["as it is", "twin"])
 def test_a_user_who_set_nothing_has_a_simulator_that_only_this_computer_reaches(ros, reachable):
     for name in ("ROS_HOSTNAME", "ROS_IP"):

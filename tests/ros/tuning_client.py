@@ -40,6 +40,7 @@ def in_diagnostics():
 
 first = client.get_configuration()
 seen = {"first": {name: first[name] for name in ("Q_x", "speed", "safety_distance", "answer")}}
+seen["names"] = sorted(set(first) - {"groups", "as_in_files", "answer"})
 seen["good"] = change(Q_x=7.5, speed=3.0)
 seen["bad"] = change(Q_y=9.0, speed=-1.0)
 until(lambda: "refused" in in_diagnostics())
@@ -51,8 +52,8 @@ seen["latched"] = rospy.get_param("nmpc_controller/tuning/speed")
 
 until(lambda: target.get_num_connections() and trajectory.get_num_connections())
 target.publish(PoseStamped(header=Header(frame_id="map")))
-until(lambda: len(answers) > 0)
+until(lambda: answers and answers[-1].startswith("command/pose"))
 trajectory.publish(MultiDOFJointTrajectory(header=Header(frame_id="world")))
-until(lambda: len(answers) > 1)
+until(lambda: answers[-1].startswith("command/trajectory"))
 seen["answers"] = answers
 sys.stdout.write(json.dumps(seen) + "\n")

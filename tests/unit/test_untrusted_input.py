@@ -8,9 +8,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = [
-    p
-    for pattern in ("src/*/src/**/*.py", "src/*/cfg/*.cfg")
-    for p in sorted(ROOT.glob(pattern))
+    p for pattern in ("src/*/src/**/*.py", "src/*/cfg/*.cfg") for p in sorted(ROOT.glob(pattern))
 ]
 SAFE_LOADERS = {"yaml.SafeLoader", "yaml.CSafeLoader"}
 FORBIDDEN = {"eval", "exec", "compile", "__import__", "os.system", "os.popen"}

@@ -63,6 +63,11 @@ class Guard:
         self._reference_asked = -math.inf
         self._forget(-math.inf)
 
+    @property
+    def battery_gain(self) -> float:
+        """What the battery leaves of the thrust of the vehicle's map [1], as commanded with."""
+        return self._setpoints.battery.gain
+
     def tick(self, i: GuardInputs) -> GuardOutput:
         """Return the setpoint, the mode and what is to be done at time ``i.t``."""
         if i.t < self._t:
@@ -246,7 +251,9 @@ class Guard:
     ) -> Command:
         if self.mode in PLANNED and not override:
             plan = self.ladder.plan
-            up = float(plan.state_at(i.t + plan.delay)[VELOCITY][2])
+            # the flight controller's own loop lags: what is asked for now is there that much later
+            ahead = i.t + plan.delay + self.params.vertical_lead
+            up = float(plan.state_at(ahead)[VELOCITY][2])
             return self._setpoints.of_input(rung, plan.input_at(i.t), up)
         # until DJI's own landing has begun: silence while a service call blocks is nobody's control
         awaits_landing = self.mode is Mode.LANDING and seen.in_air

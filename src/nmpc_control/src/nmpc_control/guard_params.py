@@ -27,6 +27,7 @@ class GuardParameters:
     rate: float = field(metadata={"min": 10.0, "max": 50.0})  # [Hz] of commands
     world_frame: str = field()  # frame of plans and obstacles
     vertical_command: str = field(metadata={"choices": ("thrust", "velocity")})
+    vertical_lead: float = field(metadata={"min": 0.0, "max": 1.0})  # [s] of that velocity loop
     hold_timeout: float = _positive()  # [s] in which the controller must obey `hover`
     reference_retry: float = _positive()  # [s] between requests for a local position reference
     height_speed: float = _positive()  # [m/s] below it a height counts as steady

@@ -4,7 +4,7 @@
 ROS Subscribers:
     command/pose (geometry_msgs/PoseStamped): go straight to this point, rest to rest.
     command/trajectory (trajectory_msgs/MultiDOFJointTrajectory): fly to its first point, then it.
-ROS Publishers: nmpc/answer (std_msgs/String): what became of each, in words.
+ROS Publishers: nmpc/answer (std_msgs/String): what became of each, in words, and of tuning.
 """
 
 from typing import Callable, Optional, Tuple
@@ -50,6 +50,10 @@ class Commands:
         """
         self._frame, self._controller, self._action, self._show = frame_id, controller, action, show
         self._answer = rospy.Publisher("nmpc/answer", String, queue_size=10)
+
+    def tell(self, sentence: str) -> None:
+        """Publish what became of a request."""
+        self._answer.publish(sentence)
 
     def subscribe(
         self, subscriptions: Subscriptions, ask: Callable[[Callable[[float], None]], None]
@@ -113,7 +117,7 @@ class Commands:
             except CommandError as error:
                 sentence = f"{topic} refused: {error}"
                 rospy.logwarn(sentence)
-            self._answer.publish(sentence)
+            self.tell(sentence)
 
         return lambda message: ask(lambda t: serve(t, message))
 

@@ -85,7 +85,7 @@ class ControllerNode:
             on_cancel=lambda: self._request(self._cancel_goal),
         )
         self._commands = Commands(self.frame_id, lambda: self.controller, self.action, self._show)
-        self._tuning_port = TuningPort(self._tuning, self._request, self._take)
+        self._tuning_port = TuningPort(self._tuning, self._request, self._take, self._commands.tell)
         self.publishers.add_diagnostics("tuning", self._tuning_port.diagnose)
         if self._offered:
             self._show(self._offered)

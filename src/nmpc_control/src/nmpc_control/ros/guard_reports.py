@@ -181,4 +181,5 @@ class GuardReports:
         level = DiagnosticStatus.ERROR if telemetry.battery < p.battery_low else level
         status.summary(level, f"{telemetry.battery:.0%}" if is_known else "not heard of")
         status.add("when low", p.battery_action)
+        status.add("thrust left [%]", f"{100.0 * self._guard.battery_gain:.1f}")
         return status

@@ -3,7 +3,7 @@
 
 ROS: the server's usual names below ~tuning: set_parameters, parameter_descriptions and the latched
 parameter_updates, which is what is in force. Refused: all stays, parameter_updates says the old
-values again, the reason stands in its ``answer``, in the log and in /diagnostics.
+values again, the reason stands in its ``answer``, in nmpc/answer, the log and /diagnostics.
 """
 
 import threading
@@ -31,6 +31,7 @@ class TuningPort:
         tuning: Tuning,
         ask: Callable[[Callable[[float], None]], None],
         take: Callable[[Parameters], None],
+        tell: Callable[[str], None],
     ) -> None:
         """Offer the parameters.
 
@@ -38,8 +39,9 @@ class TuningPort:
             tuning: used in the control loop only, once this is made.
             ask: has something called in the control loop with the time [s].
             take: puts parameters into force; called there.
+            tell: has a sentence for the operator published.
         """
-        self._tuning, self._ask, self._take = tuning, ask, take
+        self._tuning, self._ask, self._take, self._tell = tuning, ask, take, tell
         self._shown = values_of(tuning.parameters)  # as clients know them
         self._answer = "as in the files"
         self._server = Server(TuningConfig, self._on_change, namespace="tuning")
@@ -87,4 +89,5 @@ class TuningPort:
             answered.set()
         made, sentence = answer[0] if answer else (False, "refused: the controller did not answer")
         (rospy.loginfo if made else rospy.logwarn)(f"tuning {sentence}")
+        self._tell(f"tuning {sentence}")
         return sentence
