@@ -117,6 +117,7 @@ def test_way_and_reaction():
 
 
 GOOD_ROW = {
+    "before": "flying goal",
     "way": ["braking no_plan"],
     "nan_published": 0,
     "command_gap_ms_max": 20.0,
@@ -135,6 +136,8 @@ BRAKES = Expectation("braking no_plan", "braking no_plan", within=0.6)
         ({"way": []}, BRAKES, "got no change"),
         ({"way": []}, Expectation("as before"), None),
         ({}, Expectation("hovering recovered"), "hovering recovered at last"),
+        ({"way": []}, Expectation("flying goal"), None),
+        ({"way": ["flying held_back", "flying goal"]}, Expectation("flying goal"), None),
         ({}, Expectation("braking no_plan", "braking alarm"), "braking alarm at first"),
         ({"nan_published": 1}, BRAKES, "not finite"),
         ({"command_gap_ms_max": 60.0}, BRAKES, "for 60 ms"),

@@ -9,14 +9,14 @@ from the future count as now, and obstacles are remembered.
 import math
 from typing import Any, List, Optional, Tuple
 
-from nmpc_control.clock_steps import ClockSteps
+from nmpc_control.clock_steps import STEP, ClockSteps
 from nmpc_control.controller import Controller, Step
 from nmpc_control.dji import Axes, RcMode, rc_mode
 from nmpc_control.guard_data import Action, GuardInputs, GuardOutput
 from nmpc_control.guard_inbox import GuardInbox
 from nmpc_control.obstacle_memory import ObstacleMemory
 from nmpc_control.obstacle_params import load_obstacle_parameters
-from nmpc_control.obstacle_sighting import Sighting, fault
+from nmpc_control.obstacle_sighting import MAX_OBSTACLES, Sighting, fault
 from uav_sim.body import BodyState
 from uav_sim.closed_loop.faults.service_calls import ServiceCalls
 from uav_sim.closed_loop.faults.trouble import Trouble
@@ -41,13 +41,17 @@ class FaultyLoop(ClosedLoop):
         self._memories = (ObstacleMemory(parameters), ObstacleMemory(parameters))
         self._calls = ServiceCalls(self._try, self._call_time, self._set_authority, self._fail)
         self._posted: List[Step] = []
+        self._reading = -math.inf  # [s]
         self._guard_clock, self._controller_clock = ClockSteps(), ClockSteps()
         self._deaf_until = -math.inf  # [s]
 
     @property
     def now(self) -> float:
-        """Time [s] on the clock of the onboard computer."""
-        return self.t + sum(trouble.clock() for trouble in self.troubles)
+        """Time [s] on the clock of the onboard computer; a small step back is waited out."""
+        reading = self.t + sum(trouble.clock() for trouble in self.troubles)
+        jumped = reading < self._reading - STEP
+        self._reading = reading if jumped else max(reading, self._reading)
+        return self._reading
 
     def step(self) -> None:
         """Advance by one step, and let calls and plans go on their way."""
@@ -80,7 +84,7 @@ class FaultyLoop(ClosedLoop):
         ]
         for trouble in self.troubles:
             listed = None if listed is None else trouble.sight(listed)
-        if listed is not None:
+        if listed is not None and len(listed) <= MAX_OBSTACLES:
             judged = [(s, fault(s)) for s in listed]
             for memory in self._memories:
                 memory.hear(now, SENDER, judged)
