@@ -124,7 +124,11 @@ class GuardedM100:
         self._count += 1
         inputs = self.inbox.inputs(self.t)
         telemetry = dataclasses.replace(
-            inputs.telemetry, gps_health=5 if self.gps else 0, battery_age=0.0, battery=1.0
+            inputs.telemetry,
+            gps_health=5 if self.gps else 0,
+            needs_gps=self.gps,
+            battery_age=0.0,
+            battery=1.0,
         )
         inputs = dataclasses.replace(
             inputs, telemetry=telemetry, obstacles_stale=self.obstacles_stale

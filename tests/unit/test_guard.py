@@ -214,7 +214,7 @@ def flight_towards_a_sphere(params):
     flight.solver = cruise
     sphere = Obstacle("ball", np.array([8.0, 0.1, 5.0]), np.array([0.5]))
     flight.obstacles = (sphere,)
-    flight.change = {"gps_health": 0}
+    flight.change = INDOORS
     flight.run(6.0)
     path = np.array([inputs.estimate.vector[:3] for _, inputs, _ in flight.log])
     return flight, float(sphere.distance(path).min()) - VEHICLE.radius

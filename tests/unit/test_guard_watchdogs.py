@@ -109,6 +109,20 @@ def test_a_jump_of_the_position_is_braked_and_flown_on_after():
     assert flight.run(4.0).mode is Mode.HOVERING
 
 
+def test_a_position_that_jumps_twice_is_held_against_it_until_a_new_start():
+    flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
+    for _ in range(2):
+        flight.aircraft.x[:2] += 4.0
+        assert flight.tick().mode is Mode.BRAKING
+        output = flight.run(4.0)
+    assert output.mode is Mode.BRAKING
+    assert flight.run(30.0).mode is Mode.BRAKING
+    flight.tick(Request.RELEASE)
+    flight.run(0.5)
+    flight.tick(Request.START)
+    assert flight.run(4.0).mode is Mode.HOVERING
+
+
 def test_a_tilt_beyond_what_dji_ever_flies_is_braked_and_then_given_up():
     flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
     seen = []
@@ -118,6 +132,32 @@ def test_a_tilt_beyond_what_dji_ever_flies_is_braked_and_then_given_up():
         seen.append((output.mode, output.code))
     assert seen[0] == (Mode.BRAKING, "alarm")
     assert seen[-1] == (Mode.RELEASED, "tilt")
+
+
+@pytest.mark.parametrize("lost", [{"gps_health": 2}, {"gps_age": 0.6}])
+def test_a_position_of_gps_without_health_is_none(lost):
+    """It is braked on velocity, by attitude; then it is the pilot's."""
+    flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
+    output = flight.run(0.9, **lost)
+    assert output.mode is Mode.HOVERING
+    output = flight.run(0.2, **lost)
+    assert (output.mode, output.code, output.rung) == (Mode.BRAKING, "gps_lost", Rung.BRAKE_BLIND)
+    output = flight.run(5.0, **lost)
+    assert (output.mode, output.code) == (Mode.RELEASED, "blind")
+
+
+def test_gps_that_comes_back_is_flown_on_and_a_moment_without_is_nothing():
+    flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
+    for _ in range(5):
+        assert flight.run(0.8, gps_health=3).mode is Mode.HOVERING
+        flight.run(0.2)
+    assert flight.run(2.0, gps_health=3).mode is Mode.BRAKING
+    assert flight.run(2.5).mode is Mode.HOVERING
+
+
+def test_twin_where_the_position_comes_from_elsewhere_gps_may_be_bad():
+    flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
+    assert flight.run(8.0, gps_health=0, needs_gps=False).mode is Mode.HOVERING
 
 
 def test_landing_is_no_brake():

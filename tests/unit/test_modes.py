@@ -104,6 +104,9 @@ TABLE = [
     (Mode.BRAKING, {**IN_AIR, "effectless_total": 1.6}, Mode.RELEASED, "lost silently"),
     (Mode.FLYING, {**IN_AIR, "effectless_total": 1.6}, Mode.RELEASED, "lost silently"),
     (Mode.BRAKING, {**IN_AIR, "alarm": "the position"}, Mode.BRAKING, ""),
+    (Mode.FLYING, {**IN_AIR, "gps_lost_time": 1.1}, Mode.BRAKING, "no good health for 1.1 s"),
+    (Mode.HOVERING, {**IN_AIR, "gps_lost_time": 0.9}, Mode.HOVERING, ""),
+    (Mode.BRAKING, {**IN_AIR, "gps_lost_time": 0.1}, Mode.BRAKING, ""),
     # battery
     (Mode.FLYING, {**IN_AIR, "battery_low_time": 3.0}, Mode.HOVERING, "holds"),
     (Mode.HOVERING, {**IN_AIR, "battery_low_time": 3.0}, Mode.HOVERING, ""),

@@ -24,7 +24,7 @@ def without(**changes):
 def flight_with(solver, velocity=(0.0, 0.0, 0.0), params=PARAMS, obstacles=(), gps=0):
     """Return a flight that hovered and then begins anew at a velocity, on plans of a solver."""
     flight = Flight(params=params, aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
-    flight.change = {"gps_health": gps}
+    flight.change = {"gps_health": gps, "needs_gps": gps > 0}
     flight.aircraft.airborne([0.0, 0.0, 5.0], velocity)
 
     def from_effect(t, x):

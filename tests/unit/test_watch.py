@@ -51,6 +51,22 @@ def test_a_jump_of_the_position_is_seen_in_the_same_tick_counted_once_and_forgot
     assert not watch.has_jumped(9.0)
 
 
+def test_a_position_off_twice_is_not_believed_again_until_somebody_starts():
+    step = lambda t: [3.0 * (t >= 1.0) + 3.0 * (t >= 8.0), 0.0, 5.0]  # noqa: E731
+    alarms, watch = watch_over(step, [0.0, 0.0, 0.0], 20.0)
+    assert alarms[int(7.0 / TICK)] == ""
+    assert "" not in alarms[int(8.1 / TICK) :]
+    assert "not believed any more" in alarms[-1]
+    watch.begin_flight()
+    watch.look(estimate(20.0, step(20.0)))
+    assert watch.alarm == ""
+
+
+def test_twin_off_once_more_much_later_it_is():
+    step = lambda t: [3.0 * (t >= 1.0) + 3.0 * (t >= 40.0), 0.0, 5.0]  # noqa: E731
+    assert watch_over(step, [0.0, 0.0, 0.0], 45.0)[0][-1] == ""
+
+
 def test_a_position_that_stands_still_while_the_aircraft_flies_is_seen():
     alarms, _ = watch_over(lambda t: [0.0, 0.0, 5.0], [4.0, 0.0, 0.0])
     first = next(k for k, alarm in enumerate(alarms) if alarm) * TICK

@@ -8,6 +8,7 @@ from nmpc_control.mode_conditions import (
     Rule,
     airborne,
     battery_ends_the_flight,
+    gps_is_lost,
     on_ground_again,
     recovered,
 )
@@ -105,6 +106,14 @@ COURSE: Tuple[Rule, ...] = (
         "velocity is {i.velocity_age:.2f} s old",
     ),
     Rule(
+        "gps_lost",
+        PLANNED,
+        Mode.BRAKING,
+        "the position is that of GPS, without good health for longer than `gps_timeout`",
+        gps_is_lost,
+        "GPS, from which the position comes, has had no good health for {i.gps_lost_time:.1f} s",
+    ),
+    Rule(
         "alarm",
         PLANNED,
         Mode.BRAKING,
@@ -164,8 +173,8 @@ COURSE: Tuple[Rule, ...] = (
         "recovered",
         (Mode.BRAKING,),
         Mode.FLYING,
-        "after `brake_dwell`, plans usable for `recover_time`, no alarm, authority; after a start "
-        "in the air also slower than `return_speed`, or `return_brake` over; a goal",
+        "after `brake_dwell`, plans usable for `recover_time`, no alarm, authority, GPS; after a "
+        "start in the air also slower than `return_speed`, or `return_brake` over; a goal",
         lambda i, p: recovered(i, p) and i.goal is not Goal.HOLD,
         "plans are usable again",
     ),

@@ -15,7 +15,7 @@ from nmpc_control.guard_data import Action, Command, GuardInputs, GuardOutput
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.ladder import PlanLadder, Rung
 from nmpc_control.link_watch import LinkWatch
-from nmpc_control.mode_conditions import battery_is_low, pilot_has_control
+from nmpc_control.mode_conditions import battery_is_low, gps_is_lost, pilot_has_control
 from nmpc_control.mode_inputs import AUTOMATIC, PLANNED, STREAMING, Mode, ModeInputs, Request
 from nmpc_control.obstacle_field import FieldOf, ObstacleField
 from nmpc_control.override import Override
@@ -260,6 +260,7 @@ class Guard:
         if self.mode is not Mode.BRAKING and not awaits_landing and not override:
             return Command(_SILENT_RUNGS.get(self.mode, Rung.NONE))
         has_position = seen.position_age <= self.params.modes.position_timeout
+        has_position = has_position and not gps_is_lost(seen, self.params.modes)
         has_velocity = seen.velocity_age <= self.params.modes.velocity_timeout
         rung = Rung.BRAKE if has_position and has_velocity else Rung.BRAKE_BLIND
         rung = Rung.LANDING if awaits_landing else rung

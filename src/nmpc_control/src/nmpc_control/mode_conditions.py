@@ -43,7 +43,13 @@ def recovered(i: ModeInputs, p: ModeParameters) -> bool:
     waited = i.time_in_mode >= p.brake_dwell and i.usable_time >= p.recover_time
     if i.brakes_after_start:
         waited &= i.speed <= p.return_speed or i.time_in_mode > p.return_brake
-    return waited and i.plan_usable and i.authority and not i.alarm and not i.leaving
+    hindered = i.alarm or i.leaving or i.gps_lost_time > 0.0
+    return waited and i.plan_usable and i.authority and not hindered
+
+
+def gps_is_lost(i: ModeInputs, p: ModeParameters) -> bool:
+    """Return whether the position is one of GPS without good health, as good as none."""
+    return i.gps_lost_time > p.gps_timeout
 
 
 def airborne(i: ModeInputs, p: ModeParameters) -> bool:

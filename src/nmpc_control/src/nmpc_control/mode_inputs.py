@@ -62,6 +62,7 @@ class ModeParameters:
     position_timeout: float = _positive()  # [s]
     rc_timeout: float = _positive()  # [s]
     status_timeout: float = _positive()  # [s] flight status and GPS health
+    gps_timeout: float = _not_negative()  # [s] of bad health after which GPS gives no position
     battery_timeout: float = _positive()  # [s]
     battery_start: float = _fraction()  # [1] least to start with
     battery_low: float = _fraction()  # [1] below it `battery_action` is taken
@@ -104,6 +105,7 @@ class ModeInputs:
     gps_age: float = math.inf  # [s] of the GPS health
     gps_health: int = 0
     needs_gps: bool = True  # the position comes from GPS
+    gps_lost_time: float = 0.0  # [s] for which it has been without good health, where it is needed
     battery_age: float = math.inf  # [s]
     battery: float = math.nan  # [1] state of charge
     battery_low_time: float = 0.0  # [s] for which it has been low

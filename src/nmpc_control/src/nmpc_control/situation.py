@@ -42,6 +42,7 @@ class Situation:
         self._was_away = self._switched = False
         self._low_since: Optional[float] = None
         self._critical_since: Optional[float] = None
+        self._gps_lost_since: Optional[float] = None
         self.forget()
 
     def forget(self) -> None:
@@ -59,6 +60,7 @@ class Situation:
         if mode is Mode.MANUAL:
             self._switched, self._was_away = False, i.telemetry.rc in (dji.RcMode.P, dji.RcMode.A)
         if mode in AUTOMATIC and before not in AUTOMATIC:
+            self.watch.begin_flight()
             self.home = None if i.estimate is None else i.estimate.vector[POSITION].copy()
 
     def gps_holds(self, telemetry: ModeInputs) -> bool:
@@ -94,6 +96,7 @@ class Situation:
         )
         if is_fresh:
             self.last_good = i.estimate
+        gps_lost = self._gps_lost_time(i)
         blind = telemetry.position_age > p.modes.position_timeout and not self.gps_holds(telemetry)
         # while it is held back for obstacles long unseen, what they may have grown to is no news
         is_held = bool(i.obstacles_stale) and mode in PLANNED and ladder.is_blocked(i.t)
@@ -107,7 +110,8 @@ class Situation:
             usable_time=ladder.usable_time(i.t) if is_fresh else 0.0,
             goal=ladder.goal,
             settled_time=self._settled_time(i),
-            blind_time=telemetry.position_age if blind else 0.0,
+            gps_lost_time=gps_lost,
+            blind_time=max(telemetry.position_age if blind else 0.0, gps_lost),
             brake_time_left=self._brake_time_left(i, telemetry),
             speed=_speed(i.estimate),
             brakes_after_start=self._brakes_after_start,
@@ -131,6 +135,11 @@ class Situation:
         elif telemetry.rc is dji.RcMode.F:
             self._switched = self._switched or self._was_away
         return self._switched
+
+    def _gps_lost_time(self, i: GuardInputs) -> float:
+        is_lost = i.telemetry.needs_gps and not self.gps_holds(i.telemetry)
+        self._gps_lost_since = _since(self._gps_lost_since, is_lost, i.now)
+        return 0.0 if self._gps_lost_since is None else i.now - self._gps_lost_since
 
     def _settled_time(self, i: GuardInputs) -> float:
         """Return for how long [s] it has been in the air, at height, without climbing."""

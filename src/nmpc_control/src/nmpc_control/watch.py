@@ -2,7 +2,8 @@
 """Watchdogs over the state: position against velocity, fence, speed, tilt.
 
 The position must go where the velocity leads. What it is off by is summed up and forgotten slowly,
-so that both a jump and a position that stands still while the aircraft moves are seen.
+so that both a jump and a position that stands still while the aircraft moves are seen. At rest the
+latter looks good again: whoever is off a second time soon is not believed any more in that flight.
 """
 
 import math
@@ -18,6 +19,7 @@ from nmpc_control.state import PITCH, POSITION, ROLL, VELOCITY
 LONGEST = 0.5  # [s] over which a position is compared with the one before
 MEMORY = 1.0  # [s] in which what it was off by is forgotten
 RECENT = 2.0  # [s] for which a jump stands against a start
+SOON = 30.0  # [s] between two times, from the end of one to the beginning of the next
 OUTWARD = 0.3  # [m/s] from which on it leaves the fence; slower may be noise
 
 
@@ -56,7 +58,12 @@ class Watch:
         self._before: Optional[StateEstimate] = None
         self._off = np.zeros(3)  # [m] that velocity does not explain
         self._jumped = -math.inf
+        self._is_unbelieved = False
         self._tilted_since: Optional[float] = None
+
+    def begin_flight(self) -> None:
+        """Believe the position again: somebody has asked for automatic flight."""
+        self._is_unbelieved = False
 
     def look(self, estimate: Optional[StateEstimate]) -> None:
         """Judge a state; None: there is none, which its age tells."""
@@ -64,7 +71,9 @@ class Watch:
         if estimate is None:
             return
         tilt, jump = self._tilt(estimate), self._jump(estimate)
-        self.alarm = tilt or jump or self._motion(estimate.vector)
+        distrust = "the position was off twice, it is not believed any more"
+        self.alarm = tilt or jump or (distrust if self._is_unbelieved else "")
+        self.alarm = self.alarm or self._motion(estimate.vector)
         self._before = estimate
 
     def has_jumped(self, t: float) -> bool:
@@ -81,7 +90,9 @@ class Watch:
         off = float(np.linalg.norm(self._off))
         if off <= self.params.position_jump:
             return ""
-        self.jumps += estimate.t - self._jumped > dt * 1.5
+        since = estimate.t - self._jumped
+        self.jumps += since > dt * 1.5
+        self._is_unbelieved |= MEMORY < since <= SOON
         self._jumped = estimate.t
         return f"the position is {off:.1f} m from where the velocity leads"
 

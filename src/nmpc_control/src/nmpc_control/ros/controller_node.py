@@ -35,6 +35,7 @@ import rospy
 from geometry_msgs.msg import PointStamped
 from std_msgs.msg import Empty, String
 
+from nmpc_control.clock_steps import ClockSteps
 from nmpc_control.controller import Controller
 from nmpc_control.errors import ConfigError, NmpcError
 from nmpc_control.guard_params import load_guard_parameters
@@ -91,18 +92,18 @@ class ControllerNode:
             self._show(self._offered)
 
     def run(self) -> None:
-        """Solve at the controller's rate until shutdown.
-
-        A failed tick is reported and the next one tried.
-        """
+        """Solve at the controller's rate until shutdown; after a failed tick the next is tried."""
         self.action.start()
         self._subscribe()
         ResumeService(self._request, lambda t: self.controller.take_up(t))
         rate = rospy.Rate(self.parameters.solver.budget.rate)
         period = 1.0 / self.parameters.solver.budget.rate
-        misses, last = 0, None
+        misses, last, clock = 0, None, ClockSteps()
         while not rospy.is_shutdown():
             now = rospy.Time.now()
+            if clock.went_back(now.to_sec()):
+                last = None
+                self._start_anew()
             if last is not None:
                 misses += max(0, int(round((now - last).to_sec() / period)) - 1)
             last = now
@@ -114,14 +115,13 @@ class ControllerNode:
             try:
                 rate.sleep()
             except rospy.ROSTimeMovedBackwardsException:
-                rospy.logwarn("the clock jumped backwards")
-                last = None
-                self._start_anew()
+                continue  # seen above, like a computer's own clock, of which rospy does not tell
             except rospy.ROSInterruptException:
                 break
 
     def _start_anew(self) -> None:
         """Forget everything that carries a time, as after a jump of the clock."""
+        rospy.logwarn("the clock jumped backwards")
         self.controller = Controller(self.parameters, self._vertical_command)
         self._inputs.clear()
         self._port.start_anew()

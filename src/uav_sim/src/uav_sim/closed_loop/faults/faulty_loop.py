@@ -9,21 +9,21 @@ from the future count as now, and obstacles are remembered.
 import math
 from typing import Any, List, Optional, Tuple
 
+from nmpc_control.clock_steps import STEP, ClockSteps
 from nmpc_control.controller import Controller, Step
 from nmpc_control.dji import Axes, RcMode, rc_mode
 from nmpc_control.guard_data import Action, GuardInputs, GuardOutput
 from nmpc_control.guard_inbox import GuardInbox
 from nmpc_control.obstacle_memory import ObstacleMemory
 from nmpc_control.obstacle_params import load_obstacle_parameters
-from nmpc_control.obstacle_sighting import Sighting, fault
+from nmpc_control.obstacle_sighting import MAX_OBSTACLES, Sighting, fault
 from uav_sim.body import BodyState
 from uav_sim.closed_loop.faults.service_calls import ServiceCalls
 from uav_sim.closed_loop.faults.trouble import Trouble
 from uav_sim.closed_loop.loop import ClosedLoop
 from uav_sim.telemetry import Packet
 
-CLOCK_STEP = 0.1  # [s] back that count as a jump, as in the guard's node
-HEAR_AGAIN = 0.1  # [s] for telemetry after one, the same
+HEAR_AGAIN = 0.1  # [s] for telemetry after a jump of the clock, as in the guard's node
 SENDER = "simulator"
 
 
@@ -41,13 +41,17 @@ class FaultyLoop(ClosedLoop):
         self._memories = (ObstacleMemory(parameters), ObstacleMemory(parameters))
         self._calls = ServiceCalls(self._try, self._call_time, self._set_authority, self._fail)
         self._posted: List[Step] = []
-        self._ticked = self._solved = -math.inf  # [s] on the computer's clock
+        self._reading = -math.inf  # [s]
+        self._guard_clock, self._controller_clock = ClockSteps(), ClockSteps()
         self._deaf_until = -math.inf  # [s]
 
     @property
     def now(self) -> float:
-        """Time [s] on the clock of the onboard computer."""
-        return self.t + sum(trouble.clock() for trouble in self.troubles)
+        """Time [s] on the clock of the onboard computer; a small step back is waited out."""
+        reading = self.t + sum(trouble.clock() for trouble in self.troubles)
+        jumped = reading < self._reading - STEP
+        self._reading = reading if jumped else max(reading, self._reading)
+        return self._reading
 
     def step(self) -> None:
         """Advance by one step, and let calls and plans go on their way."""
@@ -80,20 +84,19 @@ class FaultyLoop(ClosedLoop):
         ]
         for trouble in self.troubles:
             listed = None if listed is None else trouble.sight(listed)
-        if listed is not None:
+        if listed is not None and len(listed) <= MAX_OBSTACLES:
             judged = [(s, fault(s)) for s in listed]
             for memory in self._memories:
                 memory.hear(now, SENDER, judged)
 
     def solve(self) -> None:
         """Let the controller do one step; one that raises is reported by its node, no more."""
-        if self.now < self._solved - 1e-9:
+        if self._controller_clock.went_back(self.now):
             self.controller = Controller(
                 self.controller.parameters, self.guard.params.vertical_command
             )
             self.sources[0].forget(self.controller.estimator)
             self._memories[0].start_anew()
-        self._solved = self.now
         self.controller.obstacles = self._memories[0].obstacles(self.now)
 
         def think() -> Optional[Step]:
@@ -116,14 +119,13 @@ class FaultyLoop(ClosedLoop):
             return
         if not all(trouble.runs(self.t) for trouble in self.troubles) or self.t < self._deaf_until:
             return
-        if self.now < self._ticked - CLOCK_STEP:
-            self._ticked, self._deaf_until = self.now, self.t + HEAR_AGAIN
+        if self._guard_clock.went_back(self.now):
+            self._deaf_until = self.t + HEAR_AGAIN
             authority, self.inbox = self.inbox.authority, GuardInbox(self.guard.params)
             self.inbox.authority = authority
             self.sources[1].forget(self.inbox.estimator)
             self._memories[1].start_anew()
             return
-        self._ticked = max(self.now, self._ticked)
         memory = self._memories[1]
         self.inbox.obstacles = memory.obstacles(self.now)
         self.inbox.obstacles_stale = memory.stale(self.now)

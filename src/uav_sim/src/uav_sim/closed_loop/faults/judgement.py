@@ -28,6 +28,7 @@ def row_of(case: Case, situation: str, flight: Flight, expected: Expectation) ->
         "reason": ways[-1].split(maxsplit=1)[1] if ways else "",
         "expected_mode": expected.mode or flight.before.mode.name.lower(),
         "expected": expected.end if not expected.by else f"{expected.by}, then {expected.end}",
+        "before": f"{flight.before.mode.name.lower()} {flight.before.code}",
         "way": ways,
         "collision": bool(flight.loop.aircraft.collisions),
         "collided_with": sorted({c.id for c in flight.loop.aircraft.collisions}),
@@ -48,7 +49,7 @@ def failures(row: Row, expected: Expectation) -> List[str]:
     if expected.end == AS_BEFORE:
         if ways:
             found.append(f"expected no change, got {', '.join(ways)}")
-    elif not ways or ways[-1] != expected.end:
+    elif [row["before"], *ways][-1] != expected.end:
         found.append(f"expected {expected.end} at last, got {ways[-1] if ways else 'no change'}")
     if expected.by and ways[:1] != [expected.by]:
         found.append(f"expected {expected.by} at first, got {ways[0] if ways else 'no change'}")

@@ -77,6 +77,7 @@ def failed_row(job: Job, error: str) -> Row:
         "reason": "",
         "expected_mode": expected.mode,
         "expected": expected.end,
+        "before": "",
         "way": [],
         "collision": False,
         "collided_with": [],

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""Some rows of the fault matrix, and twins: with the protection off the row fails.
+
+``make faults`` flies them all.
+"""
+
+import dataclasses
+
+import pytest
+
+from uav_sim.closed_loop.faults.escape import way_out
+from uav_sim.closed_loop.faults.flight import fly
+from uav_sim.closed_loop.faults.judgement import row_of
+from uav_sim.closed_loop.faults.matrix import load_cases, load_expectations
+from uav_sim.closed_loop.faults.runner import judged
+
+CASES, EXPECTED = load_cases(), load_expectations()
+
+
+def flown(name, situation, prepare=lambda loop: None):
+    case = CASES[name]
+    return row_of(case, situation, fly(case, situation, prepare), EXPECTED[name][situation])
+
+
+@pytest.mark.parametrize(
+    ("name", "situation"),
+    [
+        ("solver_nan", "turn"),
+        ("solver_into_obstacle", "beside"),
+        ("controller_dead", "turn"),
+        ("position_silent", "beside"),
+        ("pilot_leaves_f", "turn"),
+        ("guard_raises", "hover"),
+    ],
+)
+def test_a_row_ends_as_expected(name, situation):
+    row = flown(name, situation)
+    assert row["passed"], row["failures"]
+    assert row["nan_published"] == 0
+    assert not row["collision"]
+
+
+def test_a_collision_that_nobody_could_avoid_is_known_as_such():
+    row = judged(CASES["obstacle_at_once"], "hover", EXPECTED["obstacle_at_once"]["hover"])
+    assert row["collision"]
+    assert row["unavoidable"]
+    assert row["passed"], row["failures"]
+
+
+def changed(loop, **changes):
+    """Give the guard other parameters, each a whole part of them."""
+    params = dataclasses.replace(loop.guard.params, **changes)
+    loop.guard.params = loop.guard.situation.params = params
+    loop.guard.ladder.params = params.plan_check
+
+
+def without_ages(loop):
+    p = loop.guard.params
+    lasting = dataclasses.replace(p.modes, position_timeout=100.0, velocity_timeout=100.0)
+    changed(loop, modes=lasting)
+
+
+def without_plan_age(loop):
+    changed(loop, plan_check=dataclasses.replace(loop.guard.params.plan_check, timeout=100.0))
+
+
+def without_rc(loop):
+    loop.inbox.add_rc = lambda t, axes: type(loop.inbox).add_rc(
+        loop.inbox, t, (*axes[:4], loop.guard.params.rc_switch.f, axes[5])
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "situation", "off"),
+    [
+        ("position_silent", "turn", without_ages),
+        ("controller_dead", "hover", without_plan_age),
+        ("pilot_leaves_f", "hover", without_rc),
+    ],
+)
+def test_twin_with_the_protection_off_the_row_fails(name, situation, off):
+    assert not flown(name, situation, off)["passed"]
+
+
+def without_obstacles(loop):
+    judge = loop.judge
+    loop.judge = lambda inputs: judge(dataclasses.replace(inputs, obstacles=()))
+
+
+def test_twin_a_guard_that_knows_no_obstacles_hits_one_which_could_have_been_avoided():
+    case = CASES["solver_into_obstacle"]
+    flight = fly(case, "hover", without_obstacles)
+    row = row_of(case, "hover", flight, EXPECTED[case.name]["hover"])
+    assert row["collided_with"] == ["pillar"]
+    assert not row["passed"]
+    assert way_out(case, "hover", flight)
