@@ -17,9 +17,10 @@ from uav_sim.world import World
 PROFILE = "first_flight"
 HEIGHT = 2.0  # [m]
 TARGET = np.array([4.0, -3.0, 3.0])  # [m]
+UP = np.array([1.0, 0.0, 3.0])  # [m] mostly
 
 
-def flown(vehicle="dji_hil", plant="eth", **changes):
+def flown(vehicle="dji_hil", plant="eth", target=TARGET, seconds=16.0, **changes):
     """Return a flight to a point; one hovers at 38 % of thrust, the other at 30."""
     guard = dataclasses.replace(load_guard_parameters(profile=PROFILE), **changes)
     parameters = load_parameters(vehicle, profile=PROFILE)
@@ -31,8 +32,8 @@ def flown(vehicle="dji_hil", plant="eth", **changes):
         assert loop.t < 20.0, loop.log.outputs[-1][1].reason
     began = loop.t
     x = loop.controller.estimator.estimate(loop.t).vector
-    loop.controller.itinerary.go_to(loop.t, x[:3], x[5], TARGET, 0.5)
-    while loop.t < began + 16.0:
+    loop.controller.itinerary.go_to(loop.t, x[:3], x[5], target, 0.5)
+    while loop.t < began + seconds:
         loop.step()
     loop.began = began
     return loop
@@ -74,14 +75,14 @@ def test_twin_by_thrust_the_same_wrong_map_throws_it_up(flight):
 
 
 def test_the_height_settles_with_a_model_without_dead_time():
-    loop = flown("eth", "dji_hil")
+    loop = flown("eth", "dji_hil", UP, 8.0)
     heights = np.array([truth.position[2] for truth in loop.log.truths])
-    assert heights.max() < TARGET[2] + 0.1
+    assert heights.max() < UP[2] + 0.1
     assert np.ptp(heights[-100:]) < 0.05
 
 
 def test_twin_commanding_the_velocity_of_now_it_swings():
     """DJI's velocity loop lags; what it is asked for must be what the plan has that much later."""
-    loop = flown("eth", "dji_hil", vertical_lead=0.0)
+    loop = flown("eth", "dji_hil", UP, 8.0, vertical_lead=0.0)
     heights = np.array([truth.position[2] for truth in loop.log.truths])
-    assert heights.max() > TARGET[2] + 0.3
+    assert heights.max() > UP[2] + 0.5
