@@ -15,6 +15,7 @@ from typing import Any, Callable, Deque, Dict, Optional, Tuple
 import numpy as np
 
 from nmpc_control.guard_data import Action, GuardOutput
+from nmpc_control.state import NU, NX, Goal, Plan
 from uav_sim.closed_loop.loop import ClosedLoop, hear
 
 STATE = ("attitude", "imu", "velocity", "local_position")
@@ -107,14 +108,23 @@ class LinkedLoop(ClosedLoop):
             self._send_by(topic, at_the_workstation)
 
     def _solve(self) -> None:
-        step = self.controller.step(self.controller_time)
+        t = self.controller_time
+        step = self.controller.step(t)
         if step is None:
+            nothing = self._nothing(t)
+            self._send_by("plan", lambda: self.inbox.add_plan(nothing, Goal.HOLD))
             return
         step = replace(step, plan=replace(step.plan, state_t=self._newest, solve_time=0.0))
         self._send_by("plan", lambda: self.inbox.add_plan(step.plan, step.goal))
         if self.controller.itinerary.clock_start is not None:
             self.log.clock_start = self.controller.itinerary.clock_start - self.link.skew
         self.log.steps.append(step)
+
+    def _nothing(self, t: float) -> Plan:
+        """Return what the node sends in place of a plan, at ``t`` [s]: why there is none."""
+        states, inputs = np.zeros((2, NX)), np.zeros((1, NU))
+        why = self.controller.why_not(t)
+        return Plan(t, 1.0, 0.0, states, inputs, found=False, status=why, state_t=self._newest)
 
     def _tell(self, t: float, output: GuardOutput) -> None:
         tell = super()._tell
