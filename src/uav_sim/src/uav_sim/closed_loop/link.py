@@ -16,6 +16,7 @@ import numpy as np
 
 from nmpc_control.controller import Step
 from nmpc_control.guard_data import Action, GuardOutput
+from nmpc_control.state import NU, NX, Goal, Plan
 from uav_sim.closed_loop.loop import ClosedLoop, hear
 
 STATE = ("attitude", "imu", "velocity", "local_position")
@@ -107,6 +108,16 @@ class LinkedLoop(ClosedLoop):
         if topic in STATE:
             self._send_by(topic, at_the_workstation)
 
+    def solve(self) -> None:
+        """Let the controller do one step; send its plan, or why there is none."""
+        t = self.controller_time
+        step = self.controller.step(t)
+        if step is not None:
+            self.deliver(step)
+            return
+        nothing = self._nothing(t)
+        self._send_by("plan", lambda: self.inbox.add_plan(nothing, Goal.HOLD))
+
     def deliver(self, step: Step) -> None:
         """Send a plan to the guard."""
         step = replace(step, plan=replace(step.plan, state_t=self._newest, solve_time=0.0))
@@ -124,6 +135,12 @@ class LinkedLoop(ClosedLoop):
         """Send the controller what it is to do."""
         tell = super().tell
         self._send_by("request", lambda: tell(action, output))
+
+    def _nothing(self, t: float) -> Plan:
+        """Return what the node sends in place of a plan, at ``t`` [s]: why there is none."""
+        states, inputs = np.zeros((2, NX)), np.zeros((1, NU))
+        why = self.controller.why_not(t)
+        return Plan(t, 1.0, 0.0, states, inputs, found=False, status=why, state_t=self._newest)
 
     def _send_by(self, topic: str, deliver: Callable[[], None]) -> None:
         if topic not in self._channels:

@@ -80,7 +80,7 @@ def row(scenario: Scenario, link: LinkQuality, plant: str = "dji_hil") -> Dict[s
     return {
         **found,
         "arrived": bool(outcome and outcome.arrived),
-        "reason": loop.log.outputs[-1][1].reason,
+        "reason": outcome.message if outcome else loop.log.outputs[-1][1].reason,
         "deviation_mean_m": float(deviation.mean()),
         "deviation_max_m": float(deviation.max()),
         "braking": held / max(1, len(flown)),

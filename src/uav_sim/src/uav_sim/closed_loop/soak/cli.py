@@ -73,7 +73,8 @@ def _fly(options: argparse.Namespace, name: str) -> Dict[str, np.ndarray]:
         started: List[subprocess.Popen] = []
         try:
             for _ in range(options.burners):
-                started.append(subprocess.Popen([sys.executable, "-c", BURN]))
+                burner = [sys.executable, "-c", BURN]
+                started.append(subprocess.Popen(burner, stderr=subprocess.DEVNULL))
             with open(log, "w", encoding="utf-8") as output:
                 started.append(
                     subprocess.Popen(
