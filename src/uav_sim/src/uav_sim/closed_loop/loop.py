@@ -26,6 +26,7 @@ from uav_sim.errors import SimulatorError
 from uav_sim.m100 import SimulatedM100, Truth
 from uav_sim.preset import PlantPreset
 from uav_sim.telemetry import Packet
+from uav_sim.vicon import ViconPose
 from uav_sim.world import World
 
 OBSTACLE_PERIOD = 0.1  # [s] between two lists of sensed obstacles
@@ -60,7 +61,8 @@ class ClosedLoop:
     sensed, at 10 Hz.
 
     Its joints, for whoever wants something to go wrong between the parts: ``now``, ``heard``,
-    ``receive``, ``look``, ``solve``, ``deliver``, ``tick``, ``judge``, ``send``, ``act``, ``call``.
+    ``captured``, ``receive``, ``look``, ``solve``, ``deliver``, ``tick``, ``judge``, ``send``, ``act``,
+    ``call``.
     """
 
     def __init__(
@@ -104,7 +106,7 @@ class ClosedLoop:
         """Advance by one step: telemetry, solve when due, guard when due, aircraft."""
         for packet in self.heard():
             self.receive(packet.topic, packet.t, packet.value)
-        for pose in self.aircraft.new_poses:
+        for pose in self.captured():
             for sources in self.sources:
                 sources.add_pose(*pose)
         if self.senses and self._count % self._looks == 0:
@@ -121,6 +123,10 @@ class ClosedLoop:
     def heard(self) -> List[Packet]:
         """Advance the aircraft by one step; return the telemetry that came in it."""
         return self.aircraft.step()
+
+    def captured(self) -> List[ViconPose]:
+        """Return the poses of motion capture that came in this step."""
+        return self.aircraft.new_poses
 
     def receive(self, topic: str, t: float, value: Any) -> None:
         """Take a value of ``dji_sdk``'s telemetry, stamped ``t`` [s]."""
