@@ -61,8 +61,8 @@ class ClosedLoop:
     sensed, at 10 Hz.
 
     Its joints, for whoever wants something to go wrong between the parts: ``now``, ``heard``,
-    ``captured``, ``receive``, ``look``, ``solve``, ``deliver``, ``tick``, ``judge``, ``send``, ``act``,
-    ``call``.
+    ``captured``, ``receive``, ``look``, ``solve``, ``deliver``, ``tick``, ``judge``, ``send``,
+    ``act``, ``call``.
     """
 
     def __init__(
