@@ -65,9 +65,8 @@ def without_plan_age(loop):
 
 
 def without_rc(loop):
-    loop.inbox.add_rc = lambda t, axes: type(loop.inbox).add_rc(
-        loop.inbox, t, (*axes[:4], loop.guard.params.rc_switch.f, axes[5])
-    )
+    add, f = loop.inbox.add_rc, loop.guard.params.rc_switch.f
+    loop.inbox.add_rc = lambda t, axes: add(t, axes if t < 3.0 else (*axes[:4], f, axes[5]))
 
 
 @pytest.mark.parametrize(

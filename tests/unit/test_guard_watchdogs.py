@@ -6,14 +6,18 @@ import math
 
 import numpy as np
 import pytest
-from flight_stub import LIMITS, PARAMS, TICK, VEHICLE, Aircraft, Flight, make_plan
+from flight_stub import GOOD, LIMITS, PARAMS, TICK, VEHICLE, Aircraft, Flight, make_plan
 
+from nmpc_control import dji
 from nmpc_control.dji import RcMode
+from nmpc_control.estimator import StateEstimate
 from nmpc_control.guard import Guard
-from nmpc_control.guard_data import Action
+from nmpc_control.guard_data import Action, GuardInputs
 from nmpc_control.ladder import Rung
 from nmpc_control.mode_inputs import Mode, Request
-from nmpc_control.state import Goal
+from nmpc_control.sent_inputs import SentInputs
+from nmpc_control.situation import Situation
+from nmpc_control.state import Goal, hover_state
 
 SWITCH = dataclasses.replace(
     PARAMS, modes=dataclasses.replace(PARAMS.modes, needs_switch=True, battery_time=0.5)
@@ -158,6 +162,19 @@ def test_gps_that_comes_back_is_flown_on_and_a_moment_without_is_nothing():
 def test_twin_where_the_position_comes_from_elsewhere_gps_may_be_bad():
     flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
     assert flight.run(8.0, gps_health=0, needs_gps=False).mode is Mode.HOVERING
+
+
+@pytest.mark.parametrize(("age", "is_judged"), [(0.02, True), (1.0, False)])
+def test_a_velocity_that_is_not_heard_does_not_tell_that_a_brake_has_no_effect(age, is_judged):
+    situation = Situation(PARAMS, VEHICLE, LIMITS, "")
+    x = hover_state(np.zeros(3))
+    x[6] = 4.0
+    hold = (0.0, 0.0, 0.0, 0.0, float(dji.VELOCITY))
+    for t in np.arange(0.0, 4.0, TICK):
+        telemetry = dataclasses.replace(GOOD, velocity_age=age)
+        inputs = GuardInputs(t, telemetry, StateEstimate(t, x, 0.02, age, 0.02))
+        situation.follow(inputs, TICK, Mode.BRAKING, hold, SentInputs(VEHICLE))
+    assert (situation.effect.total > 0.5) == is_judged
 
 
 def test_landing_is_no_brake():

@@ -78,7 +78,9 @@ class Situation:
         elif i.estimate is not None and axes is not None:
             state = i.estimate.vector
             if axes[4] == dji.VELOCITY:
-                self.effect.follow_hold(i.t, dt, state)
+                # a velocity that is not heard any more cannot show that it falls
+                if i.telemetry.velocity_age <= self.params.modes.velocity_timeout:
+                    self.effect.follow_hold(i.t, dt, state)
             else:
                 self.effect.follow_attitude(i.t, dt, sent.history, state)
 

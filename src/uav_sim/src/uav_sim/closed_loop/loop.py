@@ -26,6 +26,7 @@ from uav_sim.errors import SimulatorError
 from uav_sim.m100 import SimulatedM100, Truth
 from uav_sim.preset import PlantPreset
 from uav_sim.telemetry import Packet
+from uav_sim.vicon import ViconPose
 from uav_sim.world import World
 
 OBSTACLE_PERIOD = 0.1  # [s] between two lists of sensed obstacles
@@ -55,13 +56,19 @@ class NoFlightError(SimulatorError):
 class ClosedLoop:
     """One vehicle under automatic control; ``step`` advances all of it by one step of the plant.
 
-    Its position comes from motion capture where the disturbance has it, else from GPS, unless
-    ``sources`` says otherwise. Obstacles that move, or drift with the position, are handed over as
-    sensed, at 10 Hz.
+        Its position comes from motion capture where the disturbance has it, else from GPS, unless
+        ``sources`` says otherwise. Obstacles that move, or drift with the position, are handed over as
+        sensed, at 10 Hz.
 
-    Its joints, for whoever wants something between the parts: ``now``, ``controller_time``,
-    ``heard``, ``receive``, ``hear``, ``look``, ``solve``, ``deliver``, ``tick``, ``judge``,
-    ``send``, ``act``, ``tell``, ``call``, ``report``.
+    <<<<<<< HEAD
+        Its joints, for whoever wants something between the parts: ``now``, ``controller_time``,
+        ``heard``, ``receive``, ``hear``, ``look``, ``solve``, ``deliver``, ``tick``, ``judge``,
+        ``send``, ``act``, ``tell``, ``call``, ``report``.
+    =======
+        Its joints, for whoever wants something to go wrong between the parts: ``now``, ``heard``,
+        ``captured``, ``receive``, ``look``, ``solve``, ``deliver``, ``tick``, ``judge``, ``send``,
+        ``act``, ``call``.
+    >>>>>>> faults
     """
 
     def __init__(
@@ -110,7 +117,7 @@ class ClosedLoop:
         """Advance by one step: telemetry, solve when due, guard when due, aircraft."""
         for packet in self.heard():
             self.receive(packet.topic, packet.t, packet.value)
-        for pose in self.aircraft.new_poses:
+        for pose in self.captured():
             for sources in self.sources:
                 sources.add_pose(*pose)
         if self.senses and self._count % self._looks == 0:
@@ -127,6 +134,10 @@ class ClosedLoop:
     def heard(self) -> List[Packet]:
         """Advance the aircraft by one step; return the telemetry that came in it."""
         return self.aircraft.step()
+
+    def captured(self) -> List[ViconPose]:
+        """Return the poses of motion capture that came in this step."""
+        return self.aircraft.new_poses
 
     def receive(self, topic: str, t: float, value: Any) -> None:
         """Take a value of ``dji_sdk``'s telemetry, stamped ``t`` [s]."""

@@ -22,6 +22,7 @@ from uav_sim.closed_loop.faults.service_calls import ServiceCalls
 from uav_sim.closed_loop.faults.trouble import Trouble
 from uav_sim.closed_loop.loop import ClosedLoop
 from uav_sim.telemetry import Packet
+from uav_sim.vicon import ViconPose
 
 HEAR_AGAIN = 0.1  # [s] for telemetry after a jump of the clock, as in the guard's node
 SENDER = "simulator"
@@ -69,6 +70,13 @@ class FaultyLoop(ClosedLoop):
         for trouble in self.troubles:
             packets = trouble.hear(self.t, packets)
         return packets
+
+    def captured(self) -> List[ViconPose]:
+        """Return the poses that are heard."""
+        poses = super().captured()
+        for trouble in self.troubles:
+            poses = trouble.capture(poses)
+        return [pose._replace(t=pose.t + self.now - self.t) for pose in poses]
 
     def receive(self, topic: str, t: float, value: Any) -> None:
         """Take a value stamped by this computer."""

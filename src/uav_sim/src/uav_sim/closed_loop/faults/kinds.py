@@ -20,6 +20,7 @@ TROUBLES: Dict[str, Type[Trouble]] = {
     "plans_out_of_bounds": solver_troubles.PlansOutOfBounds,
     "stamps_shifted": world_troubles.StampsShifted,
     "out_of_order": world_troubles.OutOfOrder,
+    "vicon_silent": world_troubles.ViconSilent,
     "obstacles_silent": world_troubles.ObstaclesSilent,
     "obstacles_nan": world_troubles.ObstaclesNan,
     "obstacles_old": world_troubles.ObstaclesOld,

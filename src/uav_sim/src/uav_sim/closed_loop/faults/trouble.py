@@ -11,6 +11,7 @@ from nmpc_control.controller import Step
 from nmpc_control.guard_data import Action
 from nmpc_control.obstacle_sighting import Sighting
 from uav_sim.telemetry import Packet
+from uav_sim.vicon import ViconPose
 
 if TYPE_CHECKING:
     from uav_sim.closed_loop.faults.faulty_loop import FaultyLoop
@@ -36,6 +37,10 @@ class Trouble:
     def hear(self, t: float, packets: List[Packet]) -> List[Packet]:
         """Return what becomes of the packets received at ``t`` [s]; called every step."""
         return packets
+
+    def capture(self, poses: List[ViconPose]) -> List[ViconPose]:
+        """Return what becomes of the poses of motion capture; called every step."""
+        return poses
 
     def sight(self, sightings: List[Sighting]) -> Optional[List[Sighting]]:
         """Return what becomes of a list of obstacles; None: it does not come."""

@@ -10,6 +10,7 @@ from uav_sim.closed_loop.faults.trouble import Trouble
 from uav_sim.faults.topics import TOPICS
 from uav_sim.motion import STILL, Vector
 from uav_sim.telemetry import Packet
+from uav_sim.vicon import ViconPose
 
 if TYPE_CHECKING:
     from uav_sim.closed_loop.faults.faulty_loop import FaultyLoop
@@ -51,6 +52,15 @@ class OutOfOrder(Trouble):
             else:
                 self._held[packet.topic] = packet
         return result
+
+
+@dataclass
+class ViconSilent(Trouble):
+    """Motion capture falls silent."""
+
+    def capture(self, poses: List[ViconPose]) -> List[ViconPose]:
+        """Lose the poses."""
+        return []
 
 
 @dataclass
