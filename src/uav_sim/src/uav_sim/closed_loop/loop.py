@@ -56,19 +56,13 @@ class NoFlightError(SimulatorError):
 class ClosedLoop:
     """One vehicle under automatic control; ``step`` advances all of it by one step of the plant.
 
-        Its position comes from motion capture where the disturbance has it, else from GPS, unless
-        ``sources`` says otherwise. Obstacles that move, or drift with the position, are handed over as
-        sensed, at 10 Hz.
+    Its position comes from motion capture where the disturbance has it, else from GPS, unless
+    ``sources`` says otherwise. Obstacles that move, or drift with the position, are handed over as
+    sensed, at 10 Hz.
 
-    <<<<<<< HEAD
-        Its joints, for whoever wants something between the parts: ``now``, ``controller_time``,
-        ``heard``, ``receive``, ``hear``, ``look``, ``solve``, ``deliver``, ``tick``, ``judge``,
-        ``send``, ``act``, ``tell``, ``call``, ``report``.
-    =======
-        Its joints, for whoever wants something to go wrong between the parts: ``now``, ``heard``,
-        ``captured``, ``receive``, ``look``, ``solve``, ``deliver``, ``tick``, ``judge``, ``send``,
-        ``act``, ``call``.
-    >>>>>>> faults
+    Its joints, for whoever wants something between the parts: ``now``, ``controller_time``,
+    ``heard``, ``captured``, ``receive``, ``hear``, ``look``, ``solve``, ``deliver``, ``tick``,
+    ``judge``, ``send``, ``act``, ``tell``, ``call``, ``report``.
     """
 
     def __init__(
