@@ -134,7 +134,7 @@ def test_what_is_remembered_is_forgotten_outside():
 def creeping(towards, speed=0.05):
     """Return a flight on plans that creep on in a direction (3,) at a speed [m/s]."""
     flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
-    flight.change = {"gps_health": 0}
+    flight.change = {"gps_health": 0, "needs_gps": False}
     direction = np.array(towards, dtype=float)
 
     def solver(t, x):

@@ -9,6 +9,7 @@ import pytest
 from flight_stub import LIMITS, PARAMS, VEHICLE
 
 from nmpc_control import start_checks
+from nmpc_control.distrust import Distrust
 from nmpc_control.estimator import StateEstimate
 from nmpc_control.liveness import Liveness
 from nmpc_control.loop_watch import LoopWatch
@@ -151,6 +152,19 @@ def test_the_loop_knows_its_rate_and_jitter():
     for k in range(100):
         slow.tick(0.04 * k)
     assert "25 of 50 Hz" in start_checks.loop(slow, P)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "stands"),
+    [([0.0, 0.1, 0.2], False), ([0.0, 0.1, 0.6], True), ([0.0, 0.1, 40.0], False)],
+)
+def test_what_is_wrong_twice_soon_is_not_trusted_until_a_new_start(wrong, stands):
+    distrust = Distrust()
+    for t in np.arange(0.0, 50.0, 0.1):
+        distrust.note(float(t), any(abs(t - w) < 0.05 for w in wrong))
+    assert distrust.stands is stands
+    distrust.forgive()
+    assert not distrust.stands
 
 
 # before a start

@@ -126,6 +126,7 @@ class ModeInputs:
     tilt_time: float = 0.0  # [s] for which the tilt has been beyond its limit
     effectless_time: float = 0.0  # [s] of commands without effect, in this mode
     effectless_total: float = 0.0  # [s] of them since the last that had effect
+    unheeded: bool = False  # commands had no effect twice since somebody asked for the flight
     authority: bool = False
     leaving: bool = False  # the guard was told to end, and gives authority back
     failure: str = ""  # a service call of this mode failed: how

@@ -9,6 +9,7 @@ import numpy as np
 
 from nmpc_control import dji, start_checks
 from nmpc_control.command_effect import CommandEffect
+from nmpc_control.distrust import Distrust
 from nmpc_control.estimator import StateEstimate
 from nmpc_control.guard_data import GuardInputs
 from nmpc_control.guard_params import GuardParameters
@@ -36,6 +37,7 @@ class Situation:
         self.loop = LoopWatch(params.rate)
         self.watch = Watch(params.watch, limits)
         self.effect = CommandEffect(vehicle, params.watch.effect_tilt)
+        self._unheeded = Distrust()
         self.home: Optional[np.ndarray] = None  # (3,) [m] where automatic flight began
         self._since: Optional[float] = None  # [s] steady clock, when the mode began
         self._brakes_after_start = False
@@ -61,6 +63,7 @@ class Situation:
             self._switched, self._was_away = False, i.telemetry.rc in (dji.RcMode.P, dji.RcMode.A)
         if mode in AUTOMATIC and before not in AUTOMATIC:
             self.watch.begin_flight()
+            self._unheeded.forgive()
             self.home = None if i.estimate is None else i.estimate.vector[POSITION].copy()
 
     def gps_holds(self, telemetry: ModeInputs) -> bool:
@@ -98,6 +101,8 @@ class Situation:
         )
         if is_fresh:
             self.last_good = i.estimate
+        has_no_effect = mode in PLANNED and self.effect.time > p.modes.effect_brake
+        self._unheeded.note(i.now, has_no_effect)
         gps_lost = self._gps_lost_time(i)
         blind = telemetry.position_age > p.modes.position_timeout and not self.gps_holds(telemetry)
         # while it is held back for obstacles long unseen, what they may have grown to is no news
@@ -118,6 +123,7 @@ class Situation:
             speed=_speed(i.estimate),
             brakes_after_start=self._brakes_after_start,
             alarm=self.watch.alarm,
+            unheeded=self._unheeded.stands,
             tilt_time=self.watch.tilt_time,
             effectless_time=self.effect.time,
             effectless_total=self.effect.total,

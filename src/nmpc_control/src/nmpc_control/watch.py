@@ -12,6 +12,7 @@ from typing import Optional
 
 import numpy as np
 
+from nmpc_control.distrust import Distrust
 from nmpc_control.estimator import StateEstimate
 from nmpc_control.params import Limits
 from nmpc_control.state import PITCH, POSITION, ROLL, VELOCITY
@@ -19,7 +20,6 @@ from nmpc_control.state import PITCH, POSITION, ROLL, VELOCITY
 LONGEST = 0.5  # [s] over which a position is compared with the one before
 MEMORY = 1.0  # [s] in which what it was off by is forgotten
 RECENT = 2.0  # [s] for which a jump stands against a start
-SOON = 30.0  # [s] between two times, from the end of one to the beginning of the next
 OUTWARD = 0.3  # [m/s] from which on it leaves the fence; slower may be noise
 
 
@@ -49,6 +49,7 @@ class Watch:
         self.params = params
         self.limits = limits
         self.jumps = 0  # [1] since start-up
+        self._distrust = Distrust()
         self.forget()
 
     def forget(self) -> None:
@@ -58,12 +59,12 @@ class Watch:
         self._before: Optional[StateEstimate] = None
         self._off = np.zeros(3)  # [m] that velocity does not explain
         self._jumped = -math.inf
-        self._is_unbelieved = False
+        self._distrust.forget()
         self._tilted_since: Optional[float] = None
 
     def begin_flight(self) -> None:
         """Believe the position again: somebody has asked for automatic flight."""
-        self._is_unbelieved = False
+        self._distrust.forgive()
 
     def look(self, estimate: Optional[StateEstimate]) -> None:
         """Judge a state; None: there is none, which its age tells."""
@@ -72,7 +73,7 @@ class Watch:
             return
         tilt, jump = self._tilt(estimate), self._jump(estimate)
         distrust = "the position was off twice, it is not believed any more"
-        self.alarm = tilt or jump or (distrust if self._is_unbelieved else "")
+        self.alarm = tilt or jump or (distrust if self._distrust.stands else "")
         self.alarm = self.alarm or self._motion(estimate.vector)
         self._before = estimate
 
@@ -92,7 +93,7 @@ class Watch:
             return ""
         since = estimate.t - self._jumped
         self.jumps += since > dt * 1.5
-        self._is_unbelieved |= MEMORY < since <= SOON
+        self._distrust.note(estimate.t, True)
         self._jumped = estimate.t
         return f"the position is {off:.1f} m from where the velocity leads"
 
