@@ -34,7 +34,7 @@ def surroundings():
     level = load_disturbance("indoor")
     position = ErrorParameters(white=0.005, drift=0.5, time_constant=60.0)
     sensors = dataclasses.replace(level.sensors, position=position)
-    return Disturbance(dataclasses.replace(level, sensors=sensors), 5)
+    return Disturbance(dataclasses.replace(level, sensors=sensors, gps_health=5), 5)
 
 
 def fly_with(tmp_path, sources, changes):

@@ -125,7 +125,7 @@ COURSE: Tuple[Rule, ...] = (
         "no_effect",
         PLANNED,
         Mode.BRAKING,
-        "commands without effect for `effect_brake`; the second time until a new start",
+        "commands without effect for `effect_brake`",
         lambda i, p: i.effectless_time > p.effect_brake,
         "the aircraft has not followed the commands for {i.effectless_time:.1f} s",
     ),

@@ -43,7 +43,7 @@ def recovered(i: ModeInputs, p: ModeParameters) -> bool:
     waited = i.time_in_mode >= p.brake_dwell and i.usable_time >= p.recover_time
     if i.brakes_after_start:
         waited &= i.speed <= p.return_speed or i.time_in_mode > p.return_brake
-    hindered = i.alarm or i.unheeded or i.leaving or i.gps_lost_time > 0.0
+    hindered = i.alarm or i.leaving or i.gps_lost_time > 0.0
     return waited and i.plan_usable and i.authority and not hindered
 
 

@@ -92,8 +92,9 @@ RULES: Tuple[Rule, ...] = (
         "authority_lost",
         STREAMING,
         Mode.RELEASED,
-        "commands without effect for `effect_release` in all since the last that had effect",
-        lambda i, p: i.effectless_total > p.effect_release,
+        "commands without effect for `effect_release` in all since the last that had effect, or "
+        "for `effect_brake` twice within half a minute",
+        lambda i, p: i.effectless_total > p.effect_release or i.unheeded,
         "control authority is lost silently: the aircraft has not followed the commands for "
         "{i.effectless_total:.1f} s",
     ),
