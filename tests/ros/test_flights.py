@@ -159,6 +159,7 @@ def test_on_the_other_plant_it_is_at_most_half_as_bad_again(name, request, tmp_p
     assert flight.metrics["average_deviation_m"] <= allowed
 
 
+@pytest.mark.long
 def test_without_avoidance_it_collides_and_says_so(tmp_path):
     """Twin of multi_obstacle.
 

@@ -12,7 +12,7 @@ from nmpc_control import verdict as verdict_module
 from nmpc_control.clearance_check import approach, check_clearance
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_field import ObstacleField
-from nmpc_control.state import GRAVITY, POSITION, Goal, hover_state
+from nmpc_control.state import GRAVITY, POSITION, VELOCITY, Goal, hover_state
 from nmpc_control.verdict import Finding, Inside
 
 CHECK = PARAMS.plan_check
@@ -174,3 +174,14 @@ def test_creeping_out_of_the_fence_is_bounded(monkeypatch, remembers):
     flight.run(10.0)
     farthest = max(inputs.estimate.vector[1] for _, inputs, _ in flight.log) - 0.05
     assert bool(farthest < CHECK.growth_tolerance + 0.05) is remembers
+
+
+def test_the_speed_of_a_way_around_is_not_that_of_its_slowest_place():
+    plan = plan_at(2.0)
+    slow = np.array(plan.states)
+    slow[10, VELOCITY] = 0.1  # on a way that keeps the same distance
+    level = Obstacle("floor", np.array([0.0, 0.0, 0.0]), np.array([100.0, 100.0, 7.0]), "box")
+    found = check_clearance(dataclasses.replace(plan, states=slow), T, VEHICLE, [level], CHECK)
+    assert found.speed == pytest.approx(2.0)
+    ends = check_clearance(plan_at(0.1), T, VEHICLE, [level], CHECK)
+    assert ends.speed == pytest.approx(0.1)

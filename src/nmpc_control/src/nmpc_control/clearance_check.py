@@ -19,6 +19,7 @@ from nmpc_control.params import Vehicle
 from nmpc_control.state import POSITION, VELOCITY, Plan
 from nmpc_control.verdict import NOT_INSIDE, Finding, Inside, PlanCheckParameters, Verdict
 
+ALIKE = 0.03  # [m] a way around something is as near for long: its speed there is the greatest
 ENOUGH = 1.0  # [m] clearances below it are told exactly, whichever minimum is asked for
 
 Obstacles = Union[Sequence[Obstacle], ObstacleField]
@@ -82,6 +83,13 @@ def _said(plan: Plan) -> str:
     return f"the plan is verified, {remark}" if remark else "the plan is verified"
 
 
+def _speed_there(plan: Plan, times: np.ndarray) -> float:
+    """Return the greatest speed [m/s] of a plan at some times (k,) [s]."""
+    stages = plan.t + plan.delay + plan.dt * np.arange(len(plan.states))
+    speeds = np.linalg.norm(plan.states[:, VELOCITY], axis=1)
+    return float(np.interp(times, stages, speeds).max())
+
+
 def _judged(
     way: Approach, until: float, params: PlanCheckParameters, before: Inside, plan: Plan
 ) -> Verdict:
@@ -89,10 +97,8 @@ def _judged(
     now, nearest, last = way.clearance[:, 0], ahead.min(axis=1, initial=math.inf), ahead[:, -1]
     is_inside = now - way.growth < params.minimum_clearance
     inside = Inside({way.ids[i]: float(now[i]) for i in np.nonzero(is_inside)[0]})
-    speed = 0.0
-    if len(way.ids):
-        k = int(way.grown[:, : ahead.shape[1]].min(axis=0).argmin())
-        speed = float(np.linalg.norm(plan.state_at(way.times[k])[VELOCITY]))
+    near = way.grown[:, : ahead.shape[1]].min(axis=0, initial=math.inf)
+    speed = _speed_there(plan, way.times[: ahead.shape[1]][near <= near.min() + ALIKE])
     too_near = (ahead - way.growth[:, None] < params.minimum_clearance).any(axis=0)
     verdict = Verdict(
         Finding.OK,

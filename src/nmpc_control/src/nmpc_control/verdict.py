@@ -81,7 +81,7 @@ class Verdict:
     clearance: float = math.inf  # [m] hull to the nearest surface over the rest of the plan
     flown: Optional[Plan] = None  # the plan with the states to which its inputs take this aircraft
     nearest: float = math.inf  # [m] as clearance, within the horizon that is judged
-    speed: float = 0.0  # [m/s] of the plan at that place
+    speed: float = 0.0  # [m/s] of the plan there, the greatest where it is as near
     inside: Optional[Inside] = None  # now; None where that was not looked at
     conflict: float = math.inf  # [s] when it is nearer than the minimum for the first time
     way: Optional[Approach] = None  # to the obstacles, over the rest of the plan
