@@ -40,6 +40,7 @@ def test_a_row_ends_as_expected(name, situation):
     assert not row["collision"]
 
 
+@pytest.mark.long
 def test_a_collision_that_nobody_could_avoid_is_known_as_such():
     row = judged(CASES["obstacle_at_once"], "hover", EXPECTED["obstacle_at_once"]["hover"])
     assert row["collision"]

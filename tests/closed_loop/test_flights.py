@@ -96,6 +96,7 @@ def test_the_guard_alone_does_not_let_a_blind_plan_hit_a_sphere(tmp_path):
     assert not metrics["arrived"]
 
 
+@pytest.mark.long
 def test_both_backends_fly_the_same_way():
     scenario = load_scenario("step_xyz")
     figures = {}

@@ -170,6 +170,7 @@ def test_without_avoidance_it_collides_and_says_so(tmp_path):
     assert flight.status == 1
 
 
+@pytest.mark.long
 def test_an_own_scenario_file_is_flown_by_its_path(tmp_path):
     scenario = tmp_path / "mine.yaml"
     scenario.write_text(
