@@ -22,6 +22,9 @@ from uav_sim.closed_loop.faults.runner import Job, jobs, run
 from uav_sim.errors import SimulatorError
 
 
+_WIDTH = 180  # [characters] of a table that goes to a file
+
+
 def main(argv: Optional[List[str]] = None) -> None:
     """Entry point of ``fault_matrix``."""
     options = _parser().parse_args(argv)
@@ -43,7 +46,7 @@ def main(argv: Optional[List[str]] = None) -> None:
         _fail("a worker died", 1)
     except OSError as error:
         _fail(f"{error.filename}: {error.strerror}")
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else _WIDTH)
     if not options.quiet:
         console.print(table(rows))
     for row in rows:
