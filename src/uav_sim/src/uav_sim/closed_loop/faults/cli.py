@@ -21,7 +21,6 @@ from uav_sim.closed_loop.faults.judgement import Row
 from uav_sim.closed_loop.faults.runner import Job, jobs, run
 from uav_sim.errors import SimulatorError
 
-
 _WIDTH = 180  # [characters] of a table that goes to a file
 
 
