@@ -25,7 +25,7 @@ from uav_sim.closed_loop.campaign.runner import run
 from uav_sim.closed_loop.campaign.settings import SPREAD, Settings
 from uav_sim.closed_loop.campaign.suites import SUITES
 from uav_sim.closed_loop.campaign.summary import summary, table
-from uav_sim.closed_loop.options import seed
+from uav_sim.closed_loop.options import count, seed
 from uav_sim.disturbance import disturbance_names, load_disturbance
 from uav_sim.errors import SimulatorError
 from uav_sim.preset import preset_names
@@ -124,7 +124,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="campaign", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--suite", required=True, choices=sorted(SUITES), help="what is drawn")
-    parser.add_argument("--flights", type=_count, default=20, help="how many (default: 20)")
+    parser.add_argument("--flights", type=count, default=20, help="how many (default: 20)")
     parser.add_argument("--seed", type=seed, default=0, help="of the campaign (default: 0)")
     parser.add_argument("--first", type=seed, default=0, help="number of the first flight")
     parser.add_argument(
@@ -156,19 +156,12 @@ def _parser() -> argparse.ArgumentParser:
         help="another value of a parameter, like avoidance.eta=2000; may be repeated",
     )
     parser.add_argument(
-        "--workers", type=_count, default=os.cpu_count() or 1, help="processes (default: all)"
+        "--workers", type=count, default=os.cpu_count() or 1, help="processes (default: all)"
     )
     parser.add_argument("--json", type=Path, help="write all figures to this file")
     parser.add_argument("--resume", action="store_true", help="keep flights that are finished")
     parser.add_argument("--quiet", action="store_true", help="no progress, no table")
     return parser
-
-
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"got {text}, expected a whole number, 1 or more")
-    return value
 
 
 def _fail(text: str, status: int = 2) -> None:

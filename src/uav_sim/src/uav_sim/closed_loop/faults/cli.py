@@ -19,6 +19,7 @@ from nmpc_control.errors import NmpcError
 from uav_sim.closed_loop.bench.machine import machine, versions
 from uav_sim.closed_loop.faults.judgement import Row
 from uav_sim.closed_loop.faults.runner import Job, jobs, run
+from uav_sim.closed_loop.options import count
 from uav_sim.errors import SimulatorError
 
 _WIDTH = 180  # [characters] of a table that goes to a file
@@ -135,17 +136,10 @@ def _parser() -> argparse.ArgumentParser:
         metavar="WORD",
         help="rows whose fault/situation contains this; may be repeated",
     )
-    parser.add_argument("--workers", type=_count, default=2, help="processes (default: 2)")
+    parser.add_argument("--workers", type=count, default=2, help="processes (default: 2)")
     parser.add_argument("--json", type=Path, help="write all figures to this file")
     parser.add_argument("--quiet", action="store_true", help="no progress, no table")
     return parser
-
-
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"got {text}, expected a whole number, 1 or more")
-    return value
 
 
 def _fail(text: str, status: int = 2) -> None:
