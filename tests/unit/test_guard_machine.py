@@ -58,7 +58,7 @@ def goal(t, x):
 
 
 def wild(t, x):
-    rng = np.random.default_rng(round(t * 50))
+    rng = np.random.default_rng(abs(round(t * 50)))
     return make_plan(x, t, rng.normal(size=(60, 4)) * [5.0, 0.5, 0.5, 1.0]), Goal.HOLD
 
 
