@@ -97,9 +97,9 @@ def _judged(
     now, nearest, last = way.clearance[:, 0], ahead.min(axis=1, initial=math.inf), ahead[:, -1]
     is_inside = now - way.growth < params.minimum_clearance
     inside = Inside({way.ids[i]: float(now[i]) for i in np.nonzero(is_inside)[0]})
-    near = way.grown[:, : ahead.shape[1]].min(axis=0, initial=math.inf)
-    speed = _speed_there(plan, way.times[: ahead.shape[1]][near <= near.min() + ALIKE])
-    too_near = (ahead - way.growth[:, None] < params.minimum_clearance).any(axis=0)
+    near = (ahead - way.growth[:, None]).min(axis=0, initial=math.inf)
+    speed = _speed_there(plan, way.times[: len(near)][near <= near.min() + ALIKE])
+    too_near = near < params.minimum_clearance
     verdict = Verdict(
         Finding.OK,
         _said(plan),
