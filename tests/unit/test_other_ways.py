@@ -45,6 +45,7 @@ def fly(nmpc, guides, obstacles, ticks, y=0.0, noise=0.0):
         x_ref[:, 0] = SPEED * (TICK * i + nmpc.structure.dt * np.arange(len(x_ref)))
         x_ref[:, 2], x_ref[:, 6] = 5.0, SPEED
         plan = nmpc.solve(TICK * i, x, x_ref, u, obstacles)
+        nmpc.prepare()
         assert plan.found
         u, x = plan.inputs[0], plan.states[1].copy()
         x[:3] += noise * rng.normal(size=3)
@@ -128,6 +129,24 @@ def test_a_tick_from_scratch_tries_few_sides_and_the_next_ones_the_others(nmpc, 
         tried.clear()
         fly(nmpc, 1, (BALL,), 12)
         assert len(tried) == 6 + 2, "then one now and then"
+
+
+def test_a_plan_does_not_wait_for_other_ways(nmpc, counting):
+    """They are looked for in the time until the next solve; at its beginning where there was none."""
+    _, plans = fly(nmpc, 1, (BALL,), 2)
+    x_ref, x = np.tile(plans[-1].states[0], (nmpc.structure.horizon + 1, 1)), plans[-1].states[2]
+    x_ref[:, 0] += np.linspace(0.0, 10.0, len(x_ref))
+    starts = []
+    for prepares in (True, False):
+        fly(nmpc, 1, (BALL,), 2)
+        counting.solves = 0
+        nmpc.solve(2 * TICK, x, x_ref, hover_input(), (BALL,))
+        assert counting.solves == 1
+        if prepares:
+            nmpc.prepare()
+            assert counting.solves > 1
+        starts.append(nmpc.solve(3 * TICK, x, x_ref, hover_input(), (BALL,)).states)
+    assert np.array_equal(*starts)
 
 
 def test_ticks_that_find_nothing_try_all_sides_in_turn(nmpc):

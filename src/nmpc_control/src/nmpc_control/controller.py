@@ -132,6 +132,10 @@ class Controller:
             engaged=engaged,
         )
 
+    def prepare(self) -> None:
+        """Do what helps the next step and no plan need wait for, once the last is on its way."""
+        self.nmpc.prepare()
+
     def why_not(self, t: float) -> str:
         """Return why ``step`` has no plan for ``t`` [s]."""
         estimate = self.estimator.estimate(t)

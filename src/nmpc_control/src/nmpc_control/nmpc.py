@@ -44,6 +44,7 @@ class Nmpc:
         )
         self._last: Optional[Solution] = None
         self._last_t = 0.0
+        self._solved: Optional[Posed] = None  # the last problem, until other ways were looked for
         self._slots = Slots(p.obstacle_slots)
         self._other_ways = OtherWays(parameters.avoidance.guides, shooting=p.backend == "compiled")
         self.held_up_by: Tuple[str, ...] = ()  # obstacles before which the last plan waits
@@ -74,7 +75,7 @@ class Nmpc:
 
     def reset(self) -> None:
         """Forget the last solution: the next solve starts from hover."""
-        self._last, self.held_up_by = None, ()
+        self._last, self._solved, self.held_up_by = None, None, ()
 
     def stage_times(self, t: float) -> np.ndarray:
         """Return when (N + 1,) [s] the telemetry shows the stages of a plan made for ``t``."""
@@ -103,9 +104,10 @@ class Nmpc:
         Raises:
             ProblemError: a wrong shape; a time, reference or obstacle that is not finite.
         """
+        start = time.perf_counter()
+        self.prepare()
         self.held_up_by = ()
         check_arguments(t, x0, x_ref, u_before, u_ref, self.structure.horizon)
-        start = time.perf_counter()
         problem = self._pose(t, x0, x_ref, u_before, obstacles, u_ref)
         guess, reference = self._guess(t), x_ref[:, POSITION]
         path = reference if guess is None else guess.states[:, POSITION]
@@ -113,15 +115,32 @@ class Nmpc:
         if guess is not None and guess.multipliers is not None:
             guess.multipliers[:, [constraints.PILOT_BOUNDS + i for i in self._slots.renewed]] = 0.0
         solution = self.solver.solve(instance, guess)
+        self._solved = problem if problem.obstacles else None
+        self._last, self._last_t = solution if solution.found else None, t
         if problem.obstacles:
-            choice = self._other_ways.improve(
-                self.solver, problem, solution, self._slots, warm=guess is not None
-            )
-            solution, self._slots = choice.solution, choice.slots
-            self.held_up_by = self._holding(problem, solution, choice.blocked)
-        self._last, self._last_t = (solution, t) if solution.found else (None, 0.0)
+            if guess is None or not solution.found:
+                solution = self._look_further(solution, at_once=True)
+            self.held_up_by = self._holding(problem, solution)
         whole = replace(solution, solve_time=time.perf_counter() - start)
         return self.as_plan(t, whole, self._remark(solution, problem))
+
+    def prepare(self) -> None:
+        """Look for a better way round for the next solve to begin with, while there is time.
+
+        A plan need not wait for this; what was not done before the next solve is done then.
+        """
+        if self._last is not None:
+            self._look_further(self._last, at_once=False)
+
+    def _look_further(self, solution: Solution, at_once: bool) -> Solution:
+        """Return the best solution of the last problem that is known now, and go on from it."""
+        problem, self._solved = self._solved, None
+        if problem is None:
+            return solution
+        choice = self._other_ways.improve(self.solver, problem, solution, self._slots, at_once)
+        self._slots = choice.slots
+        self._last = choice.solution if choice.solution.found else None
+        return choice.solution
 
     def _pose(
         self,
@@ -164,7 +183,7 @@ class Nmpc:
         """
         avoidance = self.parameters.avoidance
         if not (avoidance.pace and obstacles) or avoidance.term == "potential":
-            return self._theta
+            return self._theta.copy()
         fastest = float(np.linalg.norm(x_ref[:, VELOCITY], axis=1).max())
         fastest = max(fastest, self._slots.field_of(obstacles).fastest, _LEAST_PACE)
         own = float(np.linalg.norm(x0[VELOCITY])) - _SLOWER
@@ -219,15 +238,16 @@ class Nmpc:
             return f", obstacle margin entered by {inside:.2f}"
         return ""
 
-    def _holding(self, problem: Posed, solution: Solution, blocked: np.ndarray) -> Tuple[str, ...]:
+    def _holding(self, problem: Posed, solution: Solution) -> Tuple[str, ...]:
         """Return the ids of the obstacles before which a plan waits, nearest first, or ()."""
         soon = min(int(_SOON / self.structure.dt), self.structure.horizon)
         here = problem.x0[POSITION]
         moves = np.linalg.norm(solution.states[soon, POSITION] - here) > _NO_HEADWAY
         moves |= np.linalg.norm(problem.x0[VELOCITY]) > _NO_HEADWAY
         arrived = np.linalg.norm(problem.x_ref[-1, POSITION] - here) < _NO_HEADWAY
-        if moves or arrived or not blocked.any():
+        if moves or arrived:
             return ()
+        blocked = problem.on_reference(self._slots.field)
         distances = self._slots.field.distances(here[None], problem.times[:1])[:, 0]
         nearest = np.argsort(np.where(blocked, distances, np.inf), kind="stable")
         return tuple(self._slots.field.ids[i] for i in nearest[: min(_NAMED, blocked.sum())])

@@ -2,12 +2,12 @@
 """Solutions on other sides of what stands on the reference, and when one is worth changing to.
 
 A local optimiser stays on the side on which it began, and head-on on none. While the reference
-leads through an obstacle, each tick tries some other ways round (``guides``), and one that is
+leads through an obstacle, some other ways round (``guides``) are tried in each tick, and one that is
 cheaper by more than a little replaces the solution; the little keeps the side from flipping.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import List, Optional, Protocol, Sequence
 
 import numpy as np
@@ -75,6 +75,15 @@ class Posed:
         touch = np.interp(when - times[0], [0.0, _SOON], [_TOUCH_SOON, _TOUCH])
         return max(0.0, float((min(self.margin, least[0]) - least - touch).max()))
 
+    def on_reference(self, field: ObstacleField) -> np.ndarray:
+        """Return which obstacles (n,) stand on the reference, led away from the aircraft."""
+        reference = self.eased_reference()
+        return conflicts(field.spheres(reference, self.times), self.margin, reference)
+
+    def eased_reference(self) -> np.ndarray:
+        """Return the positions (N + 1, 3) [m] of the reference, led away from the aircraft."""
+        return eased(self.x_ref[:, POSITION], self.x0[POSITION], self.times)
+
     def free(self, path: np.ndarray) -> Instance:
         """Return the problem of following a path (N + 1, 3) [m] without obstacles."""
         x_ref = self.x_ref.copy()
@@ -107,7 +116,7 @@ class OtherWays:
         self._shooting = shooting
 
     def improve(
-        self, solver: Solver, problem: Posed, solution: Solution, slots: Slots, warm: bool
+        self, solver: Solver, problem: Posed, solution: Solution, slots: Slots, at_once: bool
     ) -> "Choice":
         """Return the solution with its slots, or a much better one with its own.
 
@@ -116,25 +125,22 @@ class OtherWays:
             problem: what is solved.
             solution: what it found from its own guess.
             slots: where the obstacles sit in it.
-            warm: whether it began from the last tick's solution; else all sides are tried, some now
-                and one in each of the next ticks.
+            at_once: whether it had none to begin with, or found none: all sides are tried then,
+                some now and one in each of the next ticks.
         """
-        reference = eased(problem.x_ref[:, POSITION], problem.x0[POSITION], problem.times)
-        spheres = slots.field.spheres(reference, problem.times)
-        field = slots.field
-        best = Choice(solution, slots, blocked=conflicts(spheres, problem.margin, reference))
+        best, field = Choice(solution, slots), slots.field
         self._ticks += 1
-        at_once = not warm or not solution.found  # else a try now and then is enough
-        if not best.blocked.any():
+        if not problem.on_reference(field).any():
             self._owed = 0
             return best
         if not self._tries:
             return best
         short_cut = problem.short_cut(field, solution)
         now = at_once or short_cut > 0.0 or self._owed
-        if not (now or self._ticks % _PAUSE == 0):
+        if not (now or self._ticks % _PAUSE == 0):  # else a try now and then is enough
             return best
         least = _merit(solution, short_cut)
+        reference = problem.eased_reference()
         ways = [self._stay(problem)] if short_cut > 0.0 else []
         across = sides(reference[-1] - reference[0])
         for index in self._due(at_once):
@@ -148,7 +154,7 @@ class OtherWays:
             merit = _merit(other, problem.short_cut(field, other))
             if other.found and merit < _BETTER * least:
                 least = merit
-                best = replace(best, solution=other, slots=seats)
+                best = Choice(other, seats)
                 self.changes += 1
         return best
 
@@ -218,8 +224,7 @@ def _merit(solution: Solution, short_cut: float) -> float:
 
 @dataclass(frozen=True)
 class Choice:
-    """A solution, where its obstacles sit, and which obstacles stand on the reference."""
+    """A solution, and where its obstacles sit."""
 
     solution: Solution
     slots: Slots
-    blocked: np.ndarray  # (n,) of all obstacles

@@ -151,6 +151,7 @@ class ControllerNode:
         if itinerary.clock_start is not None and itinerary.clock_start != clock_start:
             self.publishers.trajectory(self.scenario, itinerary.clock_start)
         self.action.report(t, step, itinerary, pursued)
+        self.controller.prepare()
 
     def _accept_goal(self, t: float) -> None:
         goal = self.action.accept()

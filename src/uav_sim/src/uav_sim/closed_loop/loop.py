@@ -164,6 +164,7 @@ class ClosedLoop:
         step = self.controller.step(self.controller_time)
         if step is not None:
             self.deliver(step)
+            self.controller.prepare()
 
     def deliver(self, step: Step) -> None:
         """Hand a plan to the guard."""
