@@ -132,7 +132,7 @@ def test_a_tick_from_scratch_tries_few_sides_and_the_next_ones_the_others(nmpc, 
 
 
 def test_a_plan_does_not_wait_for_other_ways(nmpc, counting):
-    """They are looked for in the time until the next solve; at its beginning where there was none."""
+    """They are looked for until the next solve; at its beginning where there was no time."""
     _, plans = fly(nmpc, 1, (BALL,), 2)
     x_ref, x = np.tile(plans[-1].states[0], (nmpc.structure.horizon + 1, 1)), plans[-1].states[2]
     x_ref[:, 0] += np.linspace(0.0, 10.0, len(x_ref))

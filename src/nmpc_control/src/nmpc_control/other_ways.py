@@ -2,7 +2,7 @@
 """Solutions on other sides of what stands on the reference, and when one is worth changing to.
 
 A local optimiser stays on the side on which it began, and head-on on none. While the reference
-leads through an obstacle, some other ways round (``guides``) are tried in each tick, and one that is
+leads through an obstacle, some other ways round (``guides``) are tried, and one that is
 cheaper by more than a little replaces the solution; the little keeps the side from flipping.
 """
 
