@@ -53,12 +53,22 @@ class Client:
     def __init__(self):
         self.newest, self.count = {}, dict.fromkeys(TOPICS, 0)
         self.by_stamp = defaultdict(set)
-        for name, kind in TOPICS.items():
-            rospy.Subscriber(f"dji_sdk/{name}", kind, self._on_message, name, queue_size=100)
+        self._subscribers = {name: self._subscribe(name) for name in TOPICS}
         for name in SERVICES:
             rospy.wait_for_service(f"dji_sdk/{name}", 20.0)
         self.call = {n: rospy.ServiceProxy(f"dji_sdk/{n}", kind) for n, kind in SERVICES.items()}
-        self.wait(lambda: len(self.newest) >= len(TOPICS) - 1, 20.0)
+        always = set(TOPICS) - {"local_position"}  # that one needs a reference
+        for _ in range(5):
+            if self.wait(lambda: always <= set(self.newest), 2.0):
+                break
+            for name in always - set(self.newest):  # rospy may miss a publisher that is just new
+                self._subscribers[name].unregister()
+                self._subscribers[name] = self._subscribe(name)
+
+    def _subscribe(self, name):
+        return rospy.Subscriber(
+            f"dji_sdk/{name}", TOPICS[name], self._on_message, name, queue_size=100
+        )
 
     def _on_message(self, message, name):
         self.newest[name] = message
