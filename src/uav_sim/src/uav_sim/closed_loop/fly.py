@@ -19,9 +19,10 @@ from xmlrpc.client import ServerProxy
 
 from nmpc_control.errors import NmpcError
 from nmpc_control.scenario import Scenario, load_scenario, scenario_path
-from uav_sim.errors import SimulatorError
+from uav_sim.closed_loop.command import fail, failing_in_one_line
 from uav_sim.preset import load_preset
 
+_PROGRAM = "fly"
 _DEFAULT_PORT = 11311
 _MASTER_TIMEOUT = 30.0  # [s] wall time for roslaunch to set the parameters
 _STOP_TIMEOUT = 20.0  # [s] wall time for roslaunch to end its nodes
@@ -33,16 +34,12 @@ def main(argv: Optional[List[str]] = None) -> None:
     Exit status 0 only if the flight arrived and hit nothing.
     """
     options = _parser().parse_args(argv)
-    try:
+    with failing_in_one_line(_PROGRAM):
         scenario = load_scenario(options.scenario)
         load_preset(options.plant)
         if not 0.0 < options.speed <= 20.0:
             raise NmpcError(f"--speed: got {options.speed:g}, expected a number in (0, 20]")
         options.bags.mkdir(parents=True, exist_ok=True)
-    except (NmpcError, SimulatorError) as error:
-        _fail(str(error))
-    except OSError as error:
-        _fail(f"--bags: {options.bags}: {error.strerror}")
     bag = options.bags / f"{scenario.name}_{time.strftime('%Y%m%d-%H%M%S')}.bag"
     for closing in (signal.SIGTERM, signal.SIGHUP):  # as Ctrl-C: end everything that was started
         signal.signal(closing, signal.default_int_handler)
@@ -55,7 +52,7 @@ def main(argv: Optional[List[str]] = None) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="fly", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+        prog=_PROGRAM, description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument(
         "scenario",
@@ -157,7 +154,7 @@ def _wait_for_simulated_time(nodes: "subprocess.Popen[bytes]", master_uri: str) 
 def _judge(bag: Path, operator_status: int) -> int:
     """Evaluate the bag; returns the exit status of the whole command."""
     if not bag.exists():
-        _fail(f"{bag}: no bag was recorded, see {bag.with_suffix('.log')}")
+        fail(_PROGRAM, f"{bag}: no bag was recorded, see {bag.with_suffix('.log')}")
     figures = bag.with_suffix(".json")
     command = [
         "rosrun",
@@ -170,7 +167,7 @@ def _judge(bag: Path, operator_status: int) -> int:
         str(bag.parent),
     ]
     if subprocess.run(command, check=False).returncode != 0:
-        _fail(f"{bag}: no metrics")
+        fail(_PROGRAM, f"{bag}: no metrics")
     metrics = json.loads(figures.read_text(encoding="utf-8"))
     _say(f"bag {bag}\n     metrics {figures}\n     report {bag.with_suffix('.html')}")
     good = operator_status == 0 and metrics["arrived"] and metrics["collisions"] == 0
@@ -203,7 +200,7 @@ def _free_port() -> int:
             except OSError:
                 continue
             return probe.getsockname()[1]
-    raise SimulatorError("no free port for a ROS master")
+    fail(_PROGRAM, "no free port for a ROS master")
 
 
 def _end(process: "subprocess.Popen[bytes]", how: signal.Signals) -> None:
@@ -221,8 +218,3 @@ def _end(process: "subprocess.Popen[bytes]", how: signal.Signals) -> None:
 def _say(text: str) -> None:
     sys.stdout.write(f"fly: {text}\n")
     sys.stdout.flush()
-
-
-def _fail(text: str) -> None:
-    sys.stderr.write(f"fly: {text}\n")
-    sys.exit(2)

@@ -24,43 +24,39 @@ from nmpc_control.analysis.metrics import flight_metrics
 from nmpc_control.analysis.record import Metrics
 from nmpc_control.analysis.tables import as_text
 from nmpc_control.config import load_yaml
-from nmpc_control.errors import NmpcError
 from nmpc_control.guard_params import load_guard_parameters
 from nmpc_control.params import Parameters, load_parameters
 from nmpc_control.scenario import Scenario, load_scenario, scenario_path
+from uav_sim.closed_loop.command import fail, failing_in_one_line
 from uav_sim.closed_loop.flight_record import record_of, world_of
 from uav_sim.closed_loop.loop import ClosedLoop, NoFlightError, fly
 from uav_sim.closed_loop.options import seed
 from uav_sim.disturbance import Disturbance, disturbance_names, load_disturbance
-from uav_sim.errors import SimulatorError
 from uav_sim.preset import preset_names
 from uav_sim.spread import any_preset
 from uav_sim.world import World
 
-_PAPER = "paper"
+_PROGRAM, _PAPER = "simulate", "paper"
 
 
 def main(argv: Optional[List[str]] = None) -> None:
     """Entry point of ``simulate``; exit status 0 only if the flight arrived and hit nothing."""
     options = _parser().parse_args(argv)
-    try:
+    with failing_in_one_line(_PROGRAM):
         scenario, parameters = _prepare(options)
-        metrics = simulate(
-            scenario,
-            parameters,
-            options.plant,
-            quiet=options.quiet,
-            world=_world(options, scenario, parameters.vehicle.radius),
-            disturbance=Disturbance(load_disturbance(options.disturbance), options.seed),
-        )
+        try:
+            metrics = simulate(
+                scenario,
+                parameters,
+                options.plant,
+                quiet=options.quiet,
+                world=_world(options, scenario, parameters.vehicle.radius),
+                disturbance=Disturbance(load_disturbance(options.disturbance), options.seed),
+            )
+        except NoFlightError as error:
+            fail(_PROGRAM, str(error), status=1)
         if options.json:
             options.json.write_text(json.dumps(metrics, indent=2) + "\n", encoding="utf-8")
-    except NoFlightError as error:
-        _fail(str(error), status=1)
-    except (NmpcError, SimulatorError) as error:
-        _fail(str(error))
-    except OSError as error:
-        _fail(f"{error.filename}: {error.strerror}")
     if not options.quiet:
         sys.stdout.write(as_text([metrics]) + "\n")
     sys.exit(0 if metrics["arrived"] and metrics["collisions"] == 0 else 1)
@@ -158,7 +154,7 @@ def _prepare(options: argparse.Namespace) -> Tuple[Scenario, Parameters]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="simulate", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+        prog=_PROGRAM, description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("scenario", help="name of a scenario, or path of a YAML file")
     parser.add_argument(
@@ -196,8 +192,3 @@ def _radius(text: str) -> float:
     if not 0.0 <= value <= 5.0:
         raise argparse.ArgumentTypeError(f"got {text}, expected metres in [0, 5]")
     return value
-
-
-def _fail(text: str, status: int = 2) -> None:
-    sys.stderr.write(f"simulate: {text}\n")
-    sys.exit(status)

@@ -8,7 +8,6 @@ turns on every problem, and each keeps its fastest repeat. Writes bench.json and
 import argparse
 import json
 import os
-import sys
 import time
 from pathlib import Path
 from typing import Any, Dict, List, Optional
@@ -16,14 +15,14 @@ from typing import Any, Dict, List, Optional
 from rich.console import Console
 from rich.progress import Progress
 
-from nmpc_control.errors import NmpcError
 from uav_sim.closed_loop.bench.effort import FULL, QUICK
 from uav_sim.closed_loop.bench.figures import draw
 from uav_sim.closed_loop.bench.machine import machine, versions
 from uav_sim.closed_loop.bench.sections import ORDER, SECTIONS
 from uav_sim.closed_loop.bench.tables import tables
-from uav_sim.errors import SimulatorError
+from uav_sim.closed_loop.command import failing_in_one_line
 
+_PROGRAM = "bench"
 _NOT_IN_JSON = ("samples_ms",)  # only for the figure
 
 
@@ -31,17 +30,13 @@ def main(argv: Optional[List[str]] = None) -> None:
     """Entry point of ``bench``."""
     options = _parser().parse_args(argv)
     console = Console()
-    try:
+    with failing_in_one_line(_PROGRAM):
         options.out.mkdir(parents=True, exist_ok=True)
         results = run(options, console)
         data = {key: value for key, value in results.items() if key not in _NOT_IN_JSON}
         text = json.dumps(data, indent=1, allow_nan=False)
         (options.out / "bench.json").write_text(text + "\n", encoding="utf-8")
         files = draw(results, options.out)
-    except (NmpcError, SimulatorError) as error:
-        _fail(str(error))
-    except OSError as error:
-        _fail(f"{error.filename}: {error.strerror}")
     for table in tables(results):
         console.print(table)
     console.print(*(str(file) for file in [options.out / "bench.json", *files]), sep="\n")
@@ -64,7 +59,7 @@ def run(options: argparse.Namespace, console: Console) -> Dict[str, Any]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="bench", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+        prog=_PROGRAM, description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--quick", action="store_true", help="few problems, to see that it works")
     parser.add_argument("--seed", type=_seed, default=0, help="of whatever is drawn (default: 0)")
@@ -83,8 +78,3 @@ def _seed(text: str) -> int:
     if value < 0:
         raise argparse.ArgumentTypeError(f"got {text}, expected 0 or more")
     return value
-
-
-def _fail(text: str) -> None:
-    sys.stderr.write(f"bench: {text}\n")
-    sys.exit(2)

@@ -15,9 +15,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Optional
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from nmpc_control.errors import NmpcError
 from uav_sim.closed_loop.bench.machine import machine, versions
 from uav_sim.closed_loop.campaign.flying import Row
 from uav_sim.closed_loop.campaign.ledger import Ledger
@@ -25,23 +23,30 @@ from uav_sim.closed_loop.campaign.runner import run
 from uav_sim.closed_loop.campaign.settings import SPREAD, Settings
 from uav_sim.closed_loop.campaign.suites import SUITES
 from uav_sim.closed_loop.campaign.summary import summary, table
+from uav_sim.closed_loop.command import INTERRUPTED, fail, failing_in_one_line, progress_bar
 from uav_sim.closed_loop.options import count, seed
 from uav_sim.disturbance import disturbance_names, load_disturbance
-from uav_sim.errors import SimulatorError
 from uav_sim.preset import preset_names
 from uav_sim.spread import any_preset
+
+_PROGRAM = "campaign"
 
 
 def main(argv: Optional[List[str]] = None) -> None:
     """Entry point of ``campaign``."""
     options = _parser().parse_args(argv)
-    console = Console(stderr=True)
-    try:
+    with failing_in_one_line(_PROGRAM):
         settings = _settings(options)
         path = None if options.json is None else Path(f"{options.json}l")
         ledger = Ledger(path, settings, options.resume)
         try:
-            _fly(options, settings, ledger, console)
+            _fly(options, settings, ledger)
+        except KeyboardInterrupt:
+            kept = f"; --resume goes on from {path}" if path is not None else ""
+            flown = f"{len(ledger.rows)} of {options.flights} flights"
+            fail(_PROGRAM, f"interrupted after {flown}{kept}", INTERRUPTED)
+        except BrokenProcessPool:
+            fail(_PROGRAM, "a worker died; --resume goes on from the finished flights", status=1)
         finally:
             ledger.close()
         figures = {**_summary(settings, ledger, options), "machine": machine()}
@@ -49,30 +54,14 @@ def main(argv: Optional[List[str]] = None) -> None:
         if options.json is not None:
             text = json.dumps(figures, indent=1, allow_nan=False)
             options.json.write_text(text + "\n", encoding="utf-8")
-    except KeyboardInterrupt:
-        kept = f"; --resume goes on from {path}" if path is not None else ""
-        _fail(f"interrupted after {len(ledger.rows)} of {options.flights} flights{kept}", 130)
-    except (NmpcError, SimulatorError) as error:
-        _fail(str(error))
-    except BrokenProcessPool:
-        _fail("a worker died; --resume goes on from the flights that are finished", 1)
-    except OSError as error:
-        _fail(f"{error.filename}: {error.strerror}")
     if not options.quiet:
         Console().print(table(figures))
     sys.exit(0 if figures["passed"] else 1)
 
 
-def _fly(options: argparse.Namespace, settings: Settings, ledger: Ledger, console: Console) -> None:
+def _fly(options: argparse.Namespace, settings: Settings, ledger: Ledger) -> None:
     indices = [i for i in _indices(options) if i not in ledger.rows]
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[news]}"),
-    )
-    with Progress(*columns, console=console, disable=options.quiet, transient=True) as bar:
+    with progress_bar(options.quiet) as bar:
         task = bar.add_task(
             settings.suite,
             total=options.flights,
@@ -121,7 +110,7 @@ def _settings(options: argparse.Namespace) -> Settings:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="campaign", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+        prog=_PROGRAM, description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--suite", required=True, choices=sorted(SUITES), help="what is drawn")
     parser.add_argument("--flights", type=count, default=20, help="how many (default: 20)")
@@ -162,8 +151,3 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--resume", action="store_true", help="keep flights that are finished")
     parser.add_argument("--quiet", action="store_true", help="no progress, no table")
     return parser
-
-
-def _fail(text: str, status: int = 2) -> None:
-    sys.stderr.write(f"campaign: {text}\n")
-    sys.exit(status)

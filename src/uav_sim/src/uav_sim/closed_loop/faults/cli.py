@@ -7,45 +7,36 @@ Exit status 0: every row ends as expected; 1: not; 2: bad input.
 import argparse
 import json
 import sys
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from nmpc_control.errors import NmpcError
 from uav_sim.closed_loop.bench.machine import machine, versions
+from uav_sim.closed_loop.command import fail, failing_in_one_line, progress_bar
 from uav_sim.closed_loop.faults.judgement import Row
 from uav_sim.closed_loop.faults.runner import Job, jobs, run
 from uav_sim.closed_loop.options import count
-from uav_sim.errors import SimulatorError
 
+_PROGRAM = "fault_matrix"
 _WIDTH = 180  # [characters] of a table that goes to a file
 
 
 def main(argv: Optional[List[str]] = None) -> None:
     """Entry point of ``fault_matrix``."""
     options = _parser().parse_args(argv)
-    try:
+    with failing_in_one_line(_PROGRAM):
         todo = jobs(options.only)
         if not todo:
-            _fail(f"no fault or situation is called like {' or '.join(options.only)}")
+            words = " or ".join(options.only)
+            fail(_PROGRAM, f"no fault or situation is called like {words}")
         rows = _fly(todo, options)
         figures = {**summary(rows), "machine": machine(), "versions": versions()}
         if options.json is not None:
             options.json.parent.mkdir(parents=True, exist_ok=True)
             text = json.dumps(figures, indent=1, allow_nan=False)
             options.json.write_text(text + "\n", encoding="utf-8")
-    except KeyboardInterrupt:
-        _fail("interrupted", 130)
-    except (NmpcError, SimulatorError) as error:
-        _fail(str(error))
-    except BrokenProcessPool:
-        _fail("a worker died", 1)
-    except OSError as error:
-        _fail(f"{error.filename}: {error.strerror}")
     console = Console(width=None if sys.stdout.isatty() else _WIDTH)
     if not options.quiet:
         console.print(table(rows))
@@ -105,15 +96,7 @@ def table(rows: Sequence[Row]) -> Table:
 
 def _fly(todo: Sequence[Job], options: argparse.Namespace) -> List[Row]:
     rows: Dict[Job, Row] = {}
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[news]}"),
-    )
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, disable=options.quiet, transient=True) as bar:
+    with progress_bar(options.quiet) as bar:
         task = bar.add_task("faults", total=len(todo), news="")
 
         def on_row(row: Row) -> None:
@@ -127,7 +110,7 @@ def _fly(todo: Sequence[Job], options: argparse.Namespace) -> List[Row]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="fault_matrix", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+        prog=_PROGRAM, description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument(
         "--only",
@@ -140,8 +123,3 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", type=Path, help="write all figures to this file")
     parser.add_argument("--quiet", action="store_true", help="no progress, no table")
     return parser
-
-
-def _fail(text: str, status: int = 2) -> None:
-    sys.stderr.write(f"fault_matrix: {text}\n")
-    sys.exit(status)

@@ -10,10 +10,10 @@ from typing import Any, Dict, Optional, Sequence
 
 from nmpc_control.analysis.progress import progress_of
 from nmpc_control.errors import BagError
+from uav_sim.closed_loop.command import fail, failing_in_one_line
 from uav_sim.closed_loop.replay.figure import write_figure
 from uav_sim.closed_loop.replay.recorded import read_recorded
 from uav_sim.closed_loop.replay.replay import LONG, Replay, replay
-from uav_sim.errors import SimulatorError
 from uav_sim.preset import preset_names
 from uav_sim.spread import any_preset
 
@@ -30,19 +30,16 @@ Exit status: 0; 2 if the bag cannot be used, or a file not written.
 def main(argv: Optional[Sequence[str]] = None) -> None:
     """Run the command; exits with status 2 on bad input."""
     options = _parser().parse_args(argv)
-    try:
-        recorded = read_recorded(options.bag, options.namespace, progress_of(options.bag))
+    with failing_in_one_line(PROGRAM):
+        try:
+            recorded = read_recorded(options.bag, options.namespace, progress_of(options.bag))
+        except BagError as error:
+            fail(PROGRAM, f"{options.bag}: {error}")
         result = replay(
             recorded, any_preset(options.plant), options.start, options.end, options.attitude_scale
         )
         figures = {"bag": options.bag.name, **result.figures()}
         _write(options, result, figures)
-    except BagError as error:
-        _fail(f"{options.bag}: {error}")
-    except SimulatorError as error:
-        _fail(str(error))
-    except OSError as error:
-        _fail(f"{error.filename or 'output'}: cannot be written: {error.strerror or error}")
     if not options.quiet:
         sys.stdout.write(as_text(figures))
 
@@ -139,8 +136,3 @@ def _scale(text: str) -> float:
     if not 0.0 < value <= 2.0:
         raise argparse.ArgumentTypeError(f"got {text}, expected a number above 0 and up to 2")
     return value
-
-
-def _fail(text: str) -> None:
-    sys.stderr.write(f"{PROGRAM}: {text}\n")
-    sys.exit(2)

@@ -18,13 +18,14 @@ from typing import Dict, List, Optional
 
 import numpy as np
 
-from nmpc_control.errors import NmpcError
 from nmpc_control.scenario import load_scenario, scenario_path
 from uav_sim.closed_loop.bench.machine import machine
+from uav_sim.closed_loop.command import failing_in_one_line
 from uav_sim.closed_loop.soak.figures import figures, rows, table
 from uav_sim.errors import SimulatorError
 from uav_sim.preset import load_preset
 
+_PROGRAM = "soak"
 BURN = "while True: pass"
 EXTRA = 180.0  # [s] wall time beside the flight, for start and landing
 GRACE = 20.0  # [s] roslaunch itself gives its nodes 17 s
@@ -33,7 +34,7 @@ GRACE = 20.0  # [s] roslaunch itself gives its nodes 17 s
 def main(argv: Optional[List[str]] = None) -> None:
     """Entry point of ``soak``; exit status 1 where a bar is not kept, 2 on bad input."""
     options = _parser().parse_args(argv)
-    try:
+    with failing_in_one_line(_PROGRAM):
         scenario = load_scenario(options.scenario)
         load_preset(options.plant)
         options.json.parent.mkdir(parents=True, exist_ok=True)
@@ -41,11 +42,7 @@ def main(argv: Optional[List[str]] = None) -> None:
         found = {**figures(noted), "machine": machine(), "busy_processes": options.burners}
         found["rows"] = [row._asdict() for row in rows(found)]
         options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
-    except (NmpcError, SimulatorError) as error:
-        _fail(str(error))
-    except OSError as error:
-        _fail(f"{error.filename}: {error.strerror}")
-    sys.stdout.write(f"{table(found)}\nsoak: {options.json}\n")
+    sys.stdout.write(f"{table(found)}\n{_PROGRAM}: {options.json}\n")
     sys.exit(0 if all(row.passed for row in rows(found)) else 1)
 
 
@@ -123,7 +120,7 @@ def _free_port() -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="soak", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+        prog=_PROGRAM, description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument(
         "--minutes", type=_minutes, default=10.0, help="of flight (default: %(default)s)"
@@ -140,8 +137,3 @@ def _minutes(text: str) -> float:
     if not 0.1 <= value <= 600.0:
         raise argparse.ArgumentTypeError(f"got {text}, expected minutes in [0.1, 600]")
     return value
-
-
-def _fail(text: str) -> None:
-    sys.stderr.write(f"soak: {text}\n")
-    sys.exit(2)
