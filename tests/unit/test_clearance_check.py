@@ -49,7 +49,7 @@ def scattered(rng, count, extent):
 
 def one_by_one(plan, obstacles):
     """Return the least clearance by dense sampling, each as grown as it is now."""
-    stages = plan.t + plan.delay + plan.dt * np.arange(len(plan.states))
+    stages = plan.times
     times = np.linspace(stages[0], stages[-1], 2401)
     points = np.stack([np.interp(times, stages, plan.states[:, i]) for i in range(3)], axis=1)
     least = math.inf

@@ -59,7 +59,7 @@ def check_clearance(
     if known.unusable:
         sentence = f"obstacle {known.unusable[0]} is nowhere: its numbers are not finite"
         return Verdict(Finding.CLEARANCE, sentence, math.nan, plan, math.nan)
-    stages = plan.t + plan.delay + plan.dt * np.arange(len(plan.states))
+    stages = plan.times
     start = min(max(t, stages[0]), stages[-1])
     if way is None:
         reach = max(params.minimum_clearance, ENOUGH)
@@ -85,7 +85,7 @@ def _said(plan: Plan) -> str:
 
 def _speed_there(plan: Plan, times: np.ndarray) -> float:
     """Return the greatest speed [m/s] of a plan at some times (k,) [s]."""
-    stages = plan.t + plan.delay + plan.dt * np.arange(len(plan.states))
+    stages = plan.times
     speeds = np.linalg.norm(plan.states[:, VELOCITY], axis=1)
     return float(np.interp(times, stages, speeds).max())
 

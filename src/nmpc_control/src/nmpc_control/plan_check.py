@@ -103,7 +103,7 @@ def _check_envelope(
     Beyond the fence it may not go farther than ``left_at`` [m], where it was when the fence was
     left, and the tolerance; where it has been pushed farther, the plan must lead back.
     """
-    stages = plan.t + plan.delay + plan.dt * np.arange(len(plan.states))
+    stages = plan.times
     ahead = plan.states[(stages >= t) & (stages <= t + params.clearance_horizon)]
     if not len(ahead):
         return None

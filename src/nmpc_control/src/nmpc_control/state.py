@@ -53,8 +53,7 @@ class Plan:
     """One solution of the optimal control problem; ``found`` False when there is none.
 
     ``inputs[k]`` is to be commanded from ``t + k * dt``; ``states[k]`` is what the telemetry shows
-    at
-    ``t + delay + k * dt``.
+    at ``times[k]``.
     """
 
     t: float  # [s] time at which inputs[0] is commanded
@@ -68,9 +67,7 @@ class Plan:
     solve_time: float = 0.0  # [s] wall time
     cost: float = float("nan")
     kkt_residual: float = float("nan")
-    state_t: float = float(
-        "nan"
-    )  # [s] stamp of the newest telemetry it was made from; NaN: unknown
+    state_t: float = float("nan")  # [s] stamp of the newest telemetry it came from; NaN: unknown
 
     @property
     def horizon(self) -> int:
@@ -81,6 +78,11 @@ class Plan:
     def end(self) -> float:
         """Time [s] at which the last input ends."""
         return self.t + self.dt * self.horizon
+
+    @property
+    def times(self) -> np.ndarray:
+        """When (N + 1,) [s] the telemetry shows the states."""
+        return self.t + self.delay + self.dt * np.arange(len(self.states))
 
     def input_at(self, t: float) -> np.ndarray:
         """Return the input (4,) to command at time ``t`` [s], held constant over each stage."""

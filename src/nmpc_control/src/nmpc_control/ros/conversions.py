@@ -133,7 +133,7 @@ def refusal_to_msg(sentence: str, header: Header, state_stamp: float) -> PlanMsg
 def prediction_to_msg(step: Solved, header: Header) -> Prediction:
     """Return the plan in a form that people and tools can read."""
     plan = step.plan
-    times = plan.t + plan.delay + plan.dt * np.arange(plan.horizon + 1)
+    times = plan.times
     stamps = [rospy.Time.from_sec(t) for t in times]
     return Prediction(
         header=Header(stamp=stamps[0], frame_id=header.frame_id),
