@@ -2,6 +2,7 @@
 """Values that several commands take on their command line."""
 
 import argparse
+from typing import Callable
 
 
 def seed(text: str) -> int:
@@ -12,6 +13,19 @@ def seed(text: str) -> int:
 def count(text: str) -> int:
     """Return a number of things; raises ArgumentTypeError on one below 1."""
     return _whole(text, 1)
+
+
+def between(least: float, most: float, unit: str) -> Callable[[str], float]:
+    """Return what reads a number within bounds; it raises ArgumentTypeError on another."""
+
+    def number(text: str) -> float:
+        value = float(text)
+        if not least <= value <= most:
+            expected = f"expected {unit} in [{least:g}, {most:g}]"
+            raise argparse.ArgumentTypeError(f"got {text}, {expected}")
+        return value
+
+    return number
 
 
 def _whole(text: str, least: int) -> int:

@@ -30,7 +30,7 @@ from nmpc_control.scenario import Scenario, load_scenario, scenario_path
 from uav_sim.closed_loop.command import fail, failing_in_one_line
 from uav_sim.closed_loop.flight_record import record_of, world_of
 from uav_sim.closed_loop.loop import ClosedLoop, NoFlightError, fly
-from uav_sim.closed_loop.options import seed
+from uav_sim.closed_loop.options import between, seed
 from uav_sim.disturbance import Disturbance, disturbance_names, load_disturbance
 from uav_sim.preset import preset_names
 from uav_sim.spread import any_preset
@@ -171,7 +171,9 @@ def _parser() -> argparse.ArgumentParser:
         "--avoidance", default="on", choices=["on", "off"], help="off: fly into obstacles"
     )
     parser.add_argument(
-        "--vehicle-radius", type=_radius, help="hull [m] (default: the vehicle's 0.5)"
+        "--vehicle-radius",
+        type=between(0.0, 5.0, "metres"),
+        help="hull [m] (default: the vehicle's 0.5)",
     )
     parser.add_argument(
         "--disturbance",
@@ -185,10 +187,3 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", type=Path, help="write the metrics to this file")
     parser.add_argument("--quiet", action="store_true", help="no progress, no table")
     return parser
-
-
-def _radius(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value <= 5.0:
-        raise argparse.ArgumentTypeError(f"got {text}, expected metres in [0, 5]")
-    return value

@@ -21,6 +21,7 @@ import numpy as np
 from nmpc_control.scenario import load_scenario, scenario_path
 from uav_sim.closed_loop.bench.machine import machine
 from uav_sim.closed_loop.command import failing_in_one_line
+from uav_sim.closed_loop.options import between
 from uav_sim.closed_loop.soak.figures import figures, rows, table
 from uav_sim.errors import SimulatorError
 from uav_sim.preset import load_preset
@@ -123,17 +124,13 @@ def _parser() -> argparse.ArgumentParser:
         prog=_PROGRAM, description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument(
-        "--minutes", type=_minutes, default=10.0, help="of flight (default: %(default)s)"
+        "--minutes",
+        type=between(0.1, 600.0, "minutes"),
+        default=10.0,
+        help="of flight (default: %(default)s)",
     )
     parser.add_argument("--scenario", default="multi_obstacle", help="flown again and again")
     parser.add_argument("--plant", default="dji_hil", help="preset of the simulator")
     parser.add_argument("--burners", type=int, default=1, help="processes that compute for nothing")
     parser.add_argument("--json", type=Path, default=Path("build/soak.json"), help="figures")
     return parser
-
-
-def _minutes(text: str) -> float:
-    value = float(text)
-    if not 0.1 <= value <= 600.0:
-        raise argparse.ArgumentTypeError(f"got {text}, expected minutes in [0.1, 600]")
-    return value
