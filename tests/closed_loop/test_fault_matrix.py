@@ -82,6 +82,24 @@ def test_twin_with_the_protection_off_the_row_fails(name, situation, off):
     assert not flown(name, situation, off)["passed"]
 
 
+def deaf_to_answers(loop):
+    take = loop.inbox.inputs
+
+    def inputs(t, steady):
+        loop.inbox.landing_granted = False
+        return take(t, steady)
+
+    loop.inbox.inputs = inputs
+
+
+@pytest.mark.long
+def test_twin_a_guard_that_is_not_told_of_its_landing_holds_against_it():
+    name = "status_silent_while_landing"
+    assert flown(name, "hover")["passed"]
+    row = flown(name, "hover", deaf_to_answers)
+    assert any("against DJI's landing" in words for words in row["failures"])
+
+
 def without_obstacles(loop):
     judge = loop.judge
     loop.judge = lambda inputs: judge(dataclasses.replace(inputs, obstacles=()))

@@ -26,7 +26,10 @@ class Aircraft:
         self.gate.set()
         monkeypatch.setattr(dji_services.DjiServices, "_call", lambda _, action: self._call(action))
         monkeypatch.setattr(dji_services, "PAUSE", 0.01)
-        self.services = DjiServices(self.authority.append, self._fail)
+        self.landings = []
+        self.services = DjiServices(
+            self.authority.append, self._fail, lambda: self.landings.append(self.done.release())
+        )
 
     def _call(self, action):
         self.calls.append(action)
@@ -89,6 +92,14 @@ def test_what_is_no_service_call_is_left_to_the_node(aircraft):
     aircraft.services.order([Action.LAND])
     aircraft.wait(1)
     assert aircraft.calls == [Action.LAND]
+
+
+@pytest.mark.parametrize("is_refused", [False, True])
+def test_a_landing_that_was_granted_is_told(aircraft, is_refused):
+    aircraft.refused = {Action.LAND} if is_refused else set()
+    aircraft.services.order([Action.LAND])
+    aircraft.wait(ATTEMPTS + 1 if is_refused else 2)
+    assert len(aircraft.landings) == (0 if is_refused else 1)
 
 
 def test_at_shutdown_the_release_waits_for_nobody(aircraft):

@@ -124,7 +124,11 @@ GOOD_ROW = {
     "reaction_s": 0.5,
     "collision": False,
     "collided_with": [],
+    "on_ground": False,
+    "against_landing_s": 0.0,
 }
+LANDS = Expectation("braking no_plan", lands=True)
+LANDED = Expectation("waiting landed")
 BRAKES = Expectation("braking no_plan", "braking no_plan", within=0.6)
 
 
@@ -143,6 +147,12 @@ BRAKES = Expectation("braking no_plan", "braking no_plan", within=0.6)
         ({"command_gap_ms_max": 60.0}, BRAKES, "for 60 ms"),
         ({"reaction_s": 0.62}, BRAKES, "0.6 s are allowed"),
         ({"reaction_s": None}, BRAKES, "0.6 s are allowed"),
+        ({}, LANDS, "not on the ground"),
+        ({"on_ground": True}, LANDS, None),
+        ({"way": ["landing asked", "waiting landed"]}, LANDED, "not on the ground"),
+        ({"way": ["landing asked", "waiting landed"], "on_ground": True}, LANDED, None),
+        ({"against_landing_s": 0.1}, BRAKES, None),
+        ({"against_landing_s": 0.4}, BRAKES, "landing for 0.4 s"),
         ({"collision": True, "collided_with": ["pillar"]}, BRAKES, "collided with pillar"),
     ],
 )
@@ -159,6 +169,7 @@ def test_a_call_is_repeated_and_a_newer_order_makes_it_obsolete():
         lambda action: 0.5 if action is Action.LAND else 0.0,
         lambda held: told.append(held),
         lambda sentence: told.append(sentence),
+        lambda: told.append("lands"),
     )
     calls.order([Action.LAND])
     for k in range(500):

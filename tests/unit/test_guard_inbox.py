@@ -46,13 +46,14 @@ def test_plan_request_and_failure_reach_one_tick_only(inbox):
     plan = make_plan(hover_state(np.zeros(3)), 10.0)
     inbox.add_plan(plan, Goal.APPROACH)
     inbox.add_plan_error("too short")
-    inbox.request, inbox.failure = Request.START, "refused"
+    inbox.request, inbox.failure, inbox.landing_granted = Request.START, "refused", True
     first, second = inbox.inputs(10.0), inbox.inputs(10.02)
     assert first.plan is plan
     assert (first.goal, first.plan_error) == (Goal.APPROACH, "too short")
     assert (first.telemetry.request, first.telemetry.failure) == (Request.START, "refused")
     assert (second.plan, second.plan_error) == (None, "")
     assert (second.telemetry.request, second.telemetry.failure) == (None, "")
+    assert (first.telemetry.landing_granted, second.telemetry.landing_granted) == (True, False)
 
 
 def test_a_switch_that_leaves_f_between_two_ticks_is_not_missed(inbox):

@@ -184,6 +184,40 @@ def test_landing_is_no_brake():
     assert (output.mode, output.rung, output.code) == (Mode.LANDING, Rung.LANDING, "asked")
 
 
+def landing(**answered):
+    """Return a flight that was asked to land, 3 s later; the status does not change."""
+    flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
+    flight.aircraft.serve = lambda actions: None
+    flight.tick(Request.LAND)
+    flight.tick(**answered)
+    return flight
+
+
+def test_a_landing_that_was_granted_is_not_held_against_on_an_old_status():
+    flight = landing(landing_granted=True)
+    assert flight.tick(status_age=0.4).axes is not None, "a status that is heard: it has not begun"
+    output = flight.run(10.0, status_age=0.6)
+    assert (output.mode, output.axes) == (Mode.LANDING, None)
+
+
+def test_twin_without_an_answer_it_is_held_whatever_the_age_of_the_status():
+    flight = landing()
+    assert flight.run(10.0, status_age=0.6).axes[4] == dji.VELOCITY
+
+
+def test_an_answer_to_an_earlier_call_to_land_counts_for_nothing():
+    flight = Flight(aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
+    flight.aircraft.serve = lambda actions: None
+    flight.tick(landing_granted=True)
+    flight.tick(Request.LAND)
+    assert flight.run(1.0, status_age=0.6).axes is not None
+    flight.tick(landing_granted=True)
+    flight.tick(failure="refused")
+    flight.run(1.5)
+    assert flight.tick(Request.LAND).mode is Mode.LANDING
+    assert flight.run(1.0, status_age=0.6).axes is not None
+
+
 def test_a_slow_loop_is_known():
     flight = Flight()
     flight.run(2.0)

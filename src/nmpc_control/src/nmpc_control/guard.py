@@ -15,7 +15,12 @@ from nmpc_control.guard_data import Action, Command, GuardInputs, GuardOutput
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.ladder import PlanLadder, Rung
 from nmpc_control.link_watch import LinkWatch
-from nmpc_control.mode_conditions import battery_is_low, gps_is_lost, pilot_has_control
+from nmpc_control.mode_conditions import (
+    awaits_landing,
+    battery_is_low,
+    gps_is_lost,
+    pilot_has_control,
+)
 from nmpc_control.mode_inputs import AUTOMATIC, PLANNED, STREAMING, Mode, ModeInputs, Request
 from nmpc_control.obstacle_field import FieldOf, ObstacleField
 from nmpc_control.override import Override
@@ -256,14 +261,14 @@ class Guard:
             up = float(plan.state_at(ahead)[VELOCITY][2])
             return self._setpoints.of_input(rung, plan.input_at(i.t), up)
         # until DJI's own landing has begun: silence while a service call blocks is nobody's control
-        awaits_landing = self.mode is Mode.LANDING and seen.in_air
-        if self.mode is not Mode.BRAKING and not awaits_landing and not override:
+        waits = self.mode is Mode.LANDING and awaits_landing(seen, self.params.modes)
+        if self.mode is not Mode.BRAKING and not waits and not override:
             return Command(_SILENT_RUNGS.get(self.mode, Rung.NONE))
         has_position = seen.position_age <= self.params.modes.position_timeout
         has_position = has_position and not gps_is_lost(seen, self.params.modes)
         has_velocity = seen.velocity_age <= self.params.modes.velocity_timeout
         rung = Rung.BRAKE if has_position and has_velocity else Rung.BRAKE_BLIND
-        rung = Rung.LANDING if awaits_landing else rung
+        rung = Rung.LANDING if waits else rung
         if not seen.authority:
             return Command(rung)
         if self.situation.gps_holds(seen):

@@ -30,6 +30,7 @@ class GuardInbox:
         self.obstacles_stale = ""  # why they are not known well enough
         self.authority = False  # as far as the last answer of dji_sdk tells
         self.failure = ""  # how a service call failed, until the next tick
+        self.landing_granted = False  # dji_sdk has answered a call to land, until the next tick
         self.request: Optional[Request] = None
         self.leaving = False  # the guard was told to end
         self.needs_gps = True  # the position comes from GPS
@@ -108,11 +109,12 @@ class GuardInbox:
             authority=self.authority,
             leaving=self.leaving,
             failure=self.failure,
+            landing_granted=self.landing_granted,
             request=self.request,
         )
         (plan, goal), error = self._plan or (None, Goal.HOLD), self._plan_error
         self._plan, self._plan_error, self.failure, self.request = None, "", "", None
-        self._left_f = None
+        self._left_f, self.landing_granted = None, False
         return GuardInputs(
             t=t,
             telemetry=telemetry,

@@ -57,6 +57,14 @@ def airborne(i: ModeInputs, p: ModeParameters) -> bool:
     return i.in_air and i.settled_time >= p.take_off_settle and i.authority
 
 
+def awaits_landing(i: ModeInputs, p: ModeParameters) -> bool:
+    """Return whether the flight controller's own landing has not begun, as far as is known.
+
+    Once its start is acknowledged, only a status that is still heard can say otherwise.
+    """
+    return i.in_air and (not i.landing_granted or i.status_age <= p.status_timeout)
+
+
 def on_ground_again(i: ModeInputs, p: ModeParameters) -> bool:
     """Return whether the flight controller says that it does not fly."""
     return i.flight_status in (FlightStatus.ON_GROUND, FlightStatus.LANDED)

@@ -130,6 +130,7 @@ class ModeInputs:
     authority: bool = False
     leaving: bool = False  # the guard was told to end, and gives authority back
     failure: str = ""  # a service call of this mode failed: how
+    landing_granted: bool = False  # dji_sdk has answered this mode's call to land: it begins
     request: Optional[Request] = None
     time_in_mode: float = 0.0  # [s]
 

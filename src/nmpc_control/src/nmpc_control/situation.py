@@ -41,6 +41,7 @@ class Situation:
         self.home: Optional[np.ndarray] = None  # (3,) [m] where automatic flight began
         self._since: Optional[float] = None  # [s] steady clock, when the mode began
         self._brakes_after_start = False
+        self._landing_granted = False
         self._was_away = self._switched = False
         self._low_since: Optional[float] = None
         self._critical_since: Optional[float] = None
@@ -59,6 +60,7 @@ class Situation:
         self._since = i.now
         self.effect.enter_mode()
         self._brakes_after_start = mode is Mode.BRAKING and before not in AUTOMATIC
+        self._landing_granted = False
         if mode is Mode.MANUAL:
             self._switched, self._was_away = False, i.telemetry.rc in (dji.RcMode.P, dji.RcMode.A)
         if mode in AUTOMATIC and before not in AUTOMATIC:
@@ -108,6 +110,7 @@ class Situation:
         # while it is held back for obstacles long unseen, what they may have grown to is no news
         is_held = bool(i.obstacles_stale) and mode in PLANNED and ladder.is_blocked(i.t)
         low, critical = self._battery_times(i)
+        self._landing_granted |= mode is Mode.LANDING and telemetry.landing_granted
         return replace(
             telemetry,
             switched_to_f=self._see_switch(telemetry),
@@ -127,6 +130,7 @@ class Situation:
             tilt_time=self.watch.tilt_time,
             effectless_time=self.effect.time,
             effectless_total=self.effect.total,
+            landing_granted=self._landing_granted,
             battery_low_time=low,
             battery_critical_time=critical,
             is_home=mode is Mode.HOVERING and ladder.goal is Goal.HOLD and self._is_home(i),

@@ -42,10 +42,21 @@ class DjiServices:
     """A queue of calls; a newer order makes older ones that wait or repeat obsolete."""
 
     def __init__(
-        self, on_authority: Callable[[bool], None], on_failure: Callable[[str], None]
+        self,
+        on_authority: Callable[[bool], None],
+        on_failure: Callable[[str], None],
+        on_landing: Callable[[], None],
     ) -> None:
+        """Begin to work; what calls bring is told from a thread of their own.
+
+        Args:
+            on_authority: told whether it is held now.
+            on_failure: told in words after the last attempt.
+            on_landing: told when a call to land was granted.
+        """
         self._on_authority = on_authority
         self._on_failure = on_failure
+        self._on_landing = on_landing
         self._orders: "queue.Queue[Tuple[int, Sequence[Action]]]" = queue.Queue()
         self._known = {name: KnownService(name, kind) for name, kind, _ in _CALLS.values()}
         self._newest = 0
@@ -103,6 +114,8 @@ class DjiServices:
             if succeeded:
                 if action in (Action.OBTAIN_AUTHORITY, Action.RELEASE_AUTHORITY):
                     self._on_authority(action is Action.OBTAIN_AUTHORITY)
+                elif action is Action.LAND:
+                    self._on_landing()
                 return True
             if attempt < ATTEMPTS - 1:
                 self._changed.wait(PAUSE)

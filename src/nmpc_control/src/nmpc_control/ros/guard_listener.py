@@ -87,6 +87,11 @@ class GuardListener:
         with self._lock:
             self._inbox.failure = sentence
 
+    def report_landing(self) -> None:
+        """Tell the next tick that dji_sdk has granted a call to land."""
+        with self._lock:
+            self._inbox.landing_granted = True
+
     def start_anew(self) -> None:
         """Forget what was received before the clock jumped; authority and what stands stay."""
         self.obstacles.start_anew()

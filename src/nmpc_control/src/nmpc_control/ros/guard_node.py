@@ -74,7 +74,8 @@ class GuardNode:
         self._obstacle_services = ObstacleServices(self._listener.obstacles)
         self._reports.add("position", self._listener.state.diagnose)
         SourceSwitch(self._listener.state, lambda: guard.mode in AUTOMATIC)
-        self._dji = DjiServices(self._listener.set_authority, self._listener.report_failure)
+        heard = self._listener
+        self._dji = DjiServices(heard.set_authority, heard.report_failure, heard.report_landing)
         self._questions: "queue.Queue[_Question]" = queue.Queue(maxsize=10)
         self._departure = Departure(self._dji)
         self._t = 0.0

@@ -209,6 +209,8 @@ class ClosedLoop:
                 self.tell(action, output)
             elif action is Action.OBTAIN_AUTHORITY:
                 self.inbox.authority = self.call(action)
+            elif action is Action.LAND:
+                self.inbox.landing_granted = self.call(action)
             else:
                 self.call(action)
                 if action is Action.RELEASE_AUTHORITY:

@@ -21,6 +21,7 @@ from uav_sim.body import BodyState
 from uav_sim.closed_loop.faults.service_calls import ServiceCalls
 from uav_sim.closed_loop.faults.trouble import Trouble
 from uav_sim.closed_loop.loop import ClosedLoop
+from uav_sim.phase import Phase
 from uav_sim.telemetry import Packet
 from uav_sim.vicon import ViconPose
 
@@ -36,11 +37,15 @@ class FaultyLoop(ClosedLoop):
         self.senses = True
         self.troubles: List[Trouble] = []
         self.sent: List[Tuple[float, Axes]] = []  # [s] true time, what left for the aircraft
+        self.against_landing = 0.0  # [s] into DJI's own landing, of the last setpoint sent
+        self._lands_since = -math.inf  # [s]
         self.escape: Optional[Axes] = None  # sent in place of what the guard decides
         self.pilot_heard: Optional[float] = None  # [s] when the switch was first heard to leave F
         parameters = load_obstacle_parameters()
         self._memories = (ObstacleMemory(parameters), ObstacleMemory(parameters))
-        self._calls = ServiceCalls(self._try, self._call_time, self._set_authority, self._fail)
+        self._calls = ServiceCalls(
+            self._try, self._call_time, self._set_authority, self._fail, self._note_landing
+        )
         self._posted: List[Step] = []
         self._reading = -math.inf  # [s]
         self._guard_clock, self._controller_clock = ClockSteps(), ClockSteps()
@@ -57,6 +62,8 @@ class FaultyLoop(ClosedLoop):
     def step(self) -> None:
         """Advance by one step, and let calls and plans go on their way."""
         super().step()
+        if self.aircraft.phase is not Phase.LANDING:
+            self._lands_since = self.t
         self._calls.step(self.t)
         steps, self._posted = self._posted, []
         for trouble in self.troubles:
@@ -151,6 +158,8 @@ class FaultyLoop(ClosedLoop):
     def send(self, axes: Axes) -> None:
         """Let a setpoint leave, and remember it."""
         self.sent.append((self.t, axes))
+        if self.aircraft.phase is Phase.LANDING:
+            self.against_landing = max(self.against_landing, self.t - self._lands_since)
         super().send(axes)
 
     def act(self, output: GuardOutput) -> None:
@@ -172,6 +181,9 @@ class FaultyLoop(ClosedLoop):
 
     def _set_authority(self, is_held: bool) -> None:
         self.inbox.authority = is_held
+
+    def _note_landing(self) -> None:
+        self.inbox.landing_granted = True
 
     def _fail(self, sentence: str) -> None:
         self.inbox.failure = sentence

@@ -11,6 +11,8 @@ from uav_sim.closed_loop.faults.flight import Flight
 from uav_sim.closed_loop.faults.matrix import AS_BEFORE, Case, Expectation
 
 Row = Dict[str, Any]
+AGAINST_LANDING = 0.2  # [s] for which setpoints may go on: until the flight status is heard
+_LANDED = "waiting landed"
 _ON_PLANS = (Rung.NEW_PLAN, Rung.LAST_PLAN)
 
 
@@ -36,6 +38,8 @@ def row_of(case: Case, situation: str, flight: Flight, expected: Expectation) ->
         "nan_published": nan_count(flight),
         "command_gap_ms_max": round(1e3 * longest_gap(flight), 1),
         "reaction_s": None if reacted is None else round(reacted - (since or flight.t0), 3),
+        "on_ground": flight.loop.aircraft.plant.on_ground,
+        "against_landing_s": round(flight.loop.against_landing, 3),
         "unavoidable": None,
     }
     row["failures"] = failures(row, expected)
@@ -61,6 +65,10 @@ def failures(row: Row, expected: Expectation) -> List[str]:
         late = row["reaction_s"]
         if late is None or late > expected.within + 1e-6:
             found.append(f"reacted after {late} s, {expected.within:g} s are allowed")
+    if (expected.lands or expected.end == _LANDED) and not row["on_ground"]:
+        found.append("it is not on the ground at the end")
+    if row["against_landing_s"] > AGAINST_LANDING + 1e-6:
+        found.append(f"setpoints against DJI's landing for {row['against_landing_s']:g} s")
     if row["collision"] and not expected.unavoidable:
         found.append(f"collided with {', '.join(row['collided_with'])}")
     return found

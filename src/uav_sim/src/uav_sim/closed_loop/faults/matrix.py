@@ -53,6 +53,7 @@ class Expectation:
     by: str = ""  # first change; empty: not looked at
     within: float = field(default=math.inf, metadata={"min": 0.0})  # [s] of that change
     gap_ms: float = field(default=40.0, metadata={"min": 0.0})  # of the stream, at most
+    lands: bool = False  # stands on the ground at the end, on truth; always where it has landed
     unavoidable: bool = False  # whether a collision is expected that a checker calls so
     why: str = ""
 

@@ -42,12 +42,15 @@ have, calls of `dji_sdk` are repeated as they repeat them, an exception ends no 
 - Every setpoint that left is finite, all flight long.
 - No two setpoints are more than 40 ms apart while a mode streams; where the guard itself stands still, no more than the row says.
 - The guard reacts within the time that the row gives, counted from the fault, or from when the pilot's switch is heard.
+- What has landed, and what else is expected on the ground, stands there at the end, on truth. No setpoint leaves later than 0.2 s after DJI's
+  own landing began.
 - Nothing is hit, on truth, between samples. Where something is, the same flight is flown again eleven times, each time with one setpoint from
   the fault's beginning on: DJI's own brake, full and least thrust, the greatest tilt to eight sides. Only if each of these collides too is the
   collision unavoidable; rows for which that is expected say so.
 
 `build/faults.json` has `rows` with `fault`, `situation`, `final_mode`, `reason` (of the last change; empty: none), `expected_mode`, `collision`,
 `nan_published` (setpoints that were not finite), `command_gap_ms_max`, `reaction_s`, `passed`, and `way` (all changes), `expected`,
+`on_ground`, `against_landing_s` (how long setpoints went on into DJI's own landing),
 `collided_with`, `clearance_m`, `unavoidable`, `failures` in words; beside them `collisions`, `unavoidable`, `failed`, `passed`, machine and versions.
 
 What is expected follows from the ladder ([modes](../../nmpc_control/doc/modes.md)), not from what was flown. [Faults](faults.md) has the
@@ -103,6 +106,7 @@ def _words(expectation: Expectation) -> str:
         words += f"; within {e.within:g} s"
     if e.gap_ms != Expectation(end=AS_BEFORE).gap_ms:
         words += f"; silent for at most {e.gap_ms:g} ms"
+    words += "; on the ground" if e.lands else ""
     return words + ("; collides, unavoidably" if e.unavoidable else "")
 
 

@@ -85,6 +85,8 @@ def failed_row(job: Job, error: str) -> Row:
         "nan_published": 0,
         "command_gap_ms_max": 0.0,
         "reaction_s": None,
+        "on_ground": False,
+        "against_landing_s": 0.0,
         "unavoidable": None,
         "failures": [error],
         "passed": False,

@@ -19,6 +19,7 @@ class ServiceCalls:
         call_time: Callable[[Action], float],
         on_authority: Callable[[bool], None],
         on_failure: Callable[[str], None],
+        on_landing: Callable[[], None],
     ) -> None:
         """Begin without an order.
 
@@ -27,9 +28,11 @@ class ServiceCalls:
             call_time: for how long [s] it blocks.
             on_authority: told what a call about it has brought.
             on_failure: told in words after the last attempt.
+            on_landing: told when a call to land was granted.
         """
         self._call, self._call_time = call, call_time
         self._on_authority, self._on_failure = on_authority, on_failure
+        self._on_landing = on_landing
         self._orders: Deque[Action] = deque()
         self._attempt = 0
         self._due: Optional[float] = None  # [s] when the present call ends, or is tried again
@@ -67,6 +70,8 @@ class ServiceCalls:
             self._orders.popleft()
             if action in (Action.OBTAIN_AUTHORITY, Action.RELEASE_AUTHORITY):
                 self._on_authority(action is Action.OBTAIN_AUTHORITY)
+            elif action is Action.LAND:
+                self._on_landing()
         elif self._attempt < ATTEMPTS - 1:
             self._attempt, self._due = self._attempt + 1, t + PAUSE
         else:
