@@ -2,6 +2,7 @@
 """The fault matrix as data: complete, refused where it is wrong, and the page made of it."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -114,6 +115,10 @@ def test_way_and_reaction():
     assert way(BEFORE, log) == ["braking no_plan", "manual pilot"]
     assert way(BEFORE, outputs(SENT, SENT)) == []
     assert reaction(BEFORE, log) == pytest.approx(0.02)
+    log = [(t, replace(o, rung=BEFORE.rung)) for t, o in outputs(SENT, SENT, SENT)]
+    assert reaction(BEFORE, log) is None
+    told = replace(log[1][1], actions=(Action.RETURN,))
+    assert reaction(BEFORE, [log[0], (0.04, told), log[2]]) == pytest.approx(0.04)
 
 
 GOOD_ROW = {

@@ -1,44 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""The guard's own watchdogs over a flight: switch, battery, position, tilt, landing, its loop."""
+"""The guard's own watchdogs over a flight: switch, position, tilt, landing, its loop."""
 
 import dataclasses
-import math
 
 import numpy as np
 import pytest
-from flight_stub import GOOD, LIMITS, PARAMS, TICK, VEHICLE, Aircraft, Flight, make_plan
+from flight_stub import GOOD, LIMITS, PARAMS, TICK, VEHICLE, Aircraft, Flight
 
 from nmpc_control import dji
 from nmpc_control.dji import RcMode
 from nmpc_control.estimator import StateEstimate
 from nmpc_control.guard import Guard
-from nmpc_control.guard_data import Action, GuardInputs
+from nmpc_control.guard_data import GuardInputs
 from nmpc_control.ladder import Rung
 from nmpc_control.mode_inputs import Mode, Request
 from nmpc_control.sent_inputs import SentInputs
 from nmpc_control.situation import Situation
-from nmpc_control.state import Goal, hover_state
+from nmpc_control.state import hover_state
 
 SWITCH = dataclasses.replace(
     PARAMS, modes=dataclasses.replace(PARAMS.modes, needs_switch=True, battery_time=0.5)
 )
-
-
-def with_battery(action):
-    modes = dataclasses.replace(PARAMS.modes, battery_action=action, battery_time=0.5)
-    return dataclasses.replace(PARAMS, modes=modes)
-
-
-def cruise(t, x):
-    return make_plan(x, t), Goal.TRAJECTORY
-
-
-def hover(t, x):
-    return make_plan(x, t), Goal.HOLD
-
-
-def actions_of(flight):
-    return [action for _, _, output in flight.log for action in output.actions]
 
 
 # the switch
@@ -224,79 +206,6 @@ def test_a_slow_loop_is_known():
     loop = flight.guard.situation.loop
     assert loop.rate == pytest.approx(1.0 / TICK)
     assert loop.late == 0.0
-
-
-# the battery
-
-
-def low(flight, percent=0.18):
-    flight.change = {"battery": percent}
-
-
-def test_a_low_battery_sends_it_home_once_and_lands_there():
-    flight = Flight(params=with_battery("return")).hovering()
-    flight.aircraft.airborne([0.0, 0.0, 5.0])
-    flight.run(4.0)
-    flight.aircraft.x[:2] = [30.0, -4.0]
-    flight.run(5.0)
-    flight.solver = cruise
-    low(flight)
-    output = flight.run(1.0)
-    assert output.mode is Mode.FLYING
-    assert "the battery is at 18%: return" in output.reason
-    returns = [o for _, _, o in flight.log if Action.RETURN in o.actions]
-    assert len(returns) == 1
-    assert returns[0].target == pytest.approx((0.0, 0.0, 5.0), abs=0.1)
-    flight.solver = hover  # it is there
-    flight.guard.situation.home = flight.aircraft.x[:3].copy()
-    flight.run(0.5)
-    assert Action.LAND in actions_of(flight)
-    assert flight.log[-1][2].mode in (Mode.WAITING, Mode.READY)
-
-
-def test_a_return_that_takes_too_long_lands_where_it_is():
-    params = with_battery("return")
-    params = dataclasses.replace(
-        params, modes=dataclasses.replace(params.modes, return_timeout=1.0)
-    )
-    flight = Flight(params=params, aircraft=Aircraft().airborne([0.0, 0.0, 5.0])).hovering()
-    flight.solver = cruise
-    low(flight)
-    flight.run(1.2)
-    assert Action.LAND not in actions_of(flight)
-    flight.run(0.5)
-    assert Action.LAND in actions_of(flight)
-
-
-@pytest.mark.parametrize(
-    ("action", "percent", "expected"),
-    [
-        ("land", 0.18, Action.LAND),
-        ("hover", 0.18, Action.HOLD),
-        ("hover", 0.10, Action.LAND),
-        ("return", 0.10, Action.LAND),
-    ],
-)
-def test_what_a_low_battery_does(action, percent, expected):
-    flight = Flight(params=with_battery(action), aircraft=Aircraft().airborne([0.0, 0.0, 5.0]))
-    flight.hovering()
-    flight.solver = cruise
-    low(flight, percent)
-    flight.run(0.6)
-    assert expected in actions_of(flight)
-    assert (Action.LAND in actions_of(flight)) == (expected is Action.LAND)
-
-
-def test_twin_a_battery_that_sags_for_a_moment_does_nothing():
-    flight = Flight(params=with_battery("land"), aircraft=Aircraft().airborne([0.0, 0.0, 5.0]))
-    flight.hovering()
-    for _ in range(5):
-        flight.run(0.4, battery=0.1)
-        flight.run(0.1)
-    assert flight.log[-1][2].mode is Mode.HOVERING
-    flight.run(1.0, battery=math.nan)
-    assert flight.log[-1][2].mode is Mode.HOVERING
-    assert Action.LAND not in actions_of(flight)
 
 
 # durations on a steady clock

@@ -31,6 +31,7 @@ IN_AIR = {"flight_status": FlightStatus.IN_AIR, "authority": True}
 SETTLED = {**IN_AIR, "settled_time": P.take_off_settle}
 NO_PLAN = {"plan_usable": False, "plan_finding": "the plan is 0.60 s old"}
 GIVEN_BACK = {"brakes_after_start": True}
+SILENT_LANDS = Mode.LANDING, "nothing has been heard of the battery for"
 OLD = 0.6  # [s] older than any state timeout
 
 # mode, what differs from good, mode that follows, part of the reason
@@ -114,6 +115,10 @@ TABLE = [
     (Mode.HOVERING, {**IN_AIR, "battery_low_time": 1.0, "is_home": True}, Mode.HOVERING, ""),
     (Mode.FLYING, {**IN_AIR, "battery_low_time": 62.1}, Mode.LANDING, "90%"),
     (Mode.BRAKING, {**IN_AIR, "battery_low_time": 62.1}, Mode.LANDING, "90%"),
+    (Mode.HOVERING, {**IN_AIR, "battery_silent_time": 31.0}, Mode.HOVERING, ""),
+    (Mode.HOVERING, {**IN_AIR, "battery_silent_time": 29.0, "is_home": True}, Mode.HOVERING, ""),
+    (Mode.HOVERING, {**IN_AIR, "battery_silent_time": 31.0, "is_home": True}, *SILENT_LANDS),
+    (Mode.BRAKING, {**IN_AIR, "battery_silent_time": 90.1}, *SILENT_LANDS),
     (Mode.BRAKING, {**IN_AIR, "battery_low_time": 99.0, "time_in_mode": 0.5}, Mode.BRAKING, ""),
     (Mode.HOVERING, {**IN_AIR, "battery_critical_time": 2.1}, Mode.LANDING, "90%"),
     # braking
@@ -293,6 +298,8 @@ def test_what_a_low_battery_does_is_configured(action):
     p = dataclasses.replace(P, battery_action=action)
     expected = Mode.LANDING if action == "land" else Mode.HOVERING
     assert next_mode(Mode.HOVERING, low, p).mode is expected
+    silent = dataclasses.replace(WARM, **IN_AIR, battery_silent_time=31.0)
+    assert next_mode(Mode.HOVERING, silent, p).mode is expected
     critical = dataclasses.replace(low, battery_critical_time=3.0)
     assert next_mode(Mode.HOVERING, critical, p).mode is Mode.LANDING
 

@@ -11,6 +11,7 @@ from nmpc_control.mode_conditions import (
     gps_is_lost,
     on_ground_again,
     recovered,
+    silence_ends_the_flight,
 )
 from nmpc_control.mode_inputs import PLANNED, STREAMING, Mode
 from nmpc_control.preflight import preflight
@@ -88,6 +89,22 @@ COURSE: Tuple[Rule, ...] = (
         "the same, after `brake_dwell`",
         lambda i, p: i.time_in_mode > p.brake_dwell and battery_ends_the_flight(i, p),
         "the battery is at {i.battery:.0%}",
+    ),
+    Rule(
+        "battery_silent",
+        PLANNED,
+        Mode.LANDING,
+        "no state of the battery for `battery_silent_time`, and `battery_action` done",
+        silence_ends_the_flight,
+        "nothing has been heard of the battery for {i.battery_silent_time:.0f} s",
+    ),
+    Rule(
+        "battery_silent",
+        (Mode.BRAKING,),
+        Mode.LANDING,
+        "the same, after `brake_dwell`",
+        lambda i, p: i.time_in_mode > p.brake_dwell and silence_ends_the_flight(i, p),
+        "nothing has been heard of the battery for {i.battery_silent_time:.0f} s",
     ),
     Rule(
         "position_stale",

@@ -3,7 +3,7 @@
 
 import math
 from dataclasses import replace
-from typing import Callable, Optional, Tuple
+from typing import Callable, Optional, Set, Tuple
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from nmpc_control.ladder import PlanLadder, Rung
 from nmpc_control.link_watch import LinkWatch
 from nmpc_control.mode_conditions import (
     awaits_landing,
-    battery_is_low,
+    battery_call,
+    battery_sentence,
     gps_is_lost,
     pilot_has_control,
 )
@@ -64,7 +65,7 @@ class Guard:
         self._reason = self._code = ""
         self._failures = 0
         self._axes = None  # the last that were sent, in the last tick
-        self._battery_told = False
+        self._battery_told: Set[str] = set()  # which calls of it have been acted on
         self._reference_asked = -math.inf
         self._forget(-math.inf)
 
@@ -225,13 +226,14 @@ class Guard:
         return tuple(actions)
 
     def _look_after_battery(self, i: GuardInputs, seen: ModeInputs) -> Tuple[Action, ...]:
-        """Return what a low battery asks for, once in a flight; the landing is a change of mode."""
+        """Return what a battery low or silent asks for, once; the landing is a change of mode."""
         p = self.params.modes
         if self.mode not in AUTOMATIC:
-            self._battery_told = False
-        if self.mode not in PLANNED or self._battery_told or not battery_is_low(seen, p):
+            self._battery_told.clear()
+        call = battery_call(seen, p)
+        if self.mode not in PLANNED or not call or call in self._battery_told:
             return ()
-        self._battery_told = True
+        self._battery_told.add(call)
         if p.battery_action == "return" and self._home(i) is not None:
             return (Action.RETURN,)
         self.ladder.expect_hold(i.t)
@@ -292,6 +294,5 @@ class Guard:
             return self._reason
         if 2.0 * seen.effectless_time > self.params.modes.effect_brake:
             return f"the aircraft does not follow the commands: {seen.effectless_time:.1f} s"
-        if battery_is_low(seen, self.params.modes):
-            return f"the battery is at {seen.battery:.0%}: {self.params.modes.battery_action}"
-        return self.override.remark or verdict.sentence
+        words = battery_sentence(seen, self.params.modes)
+        return words or self.override.remark or verdict.sentence

@@ -75,8 +75,41 @@ def battery_is_low(i: ModeInputs, p: ModeParameters) -> bool:
     return i.battery_low_time > p.battery_time
 
 
+def battery_is_silent(i: ModeInputs, p: ModeParameters) -> bool:
+    """Return whether it is due because nothing is heard of the battery, which empties unseen."""
+    return i.battery_silent_time > p.battery_silent_time
+
+
+def battery_call(i: ModeInputs, p: ModeParameters) -> str:
+    """Return why the configured action is due, in a word; empty where it is not."""
+    return "low" if battery_is_low(i, p) else "silent" if battery_is_silent(i, p) else ""
+
+
+def battery_sentence(i: ModeInputs, p: ModeParameters) -> str:
+    """Return what a person must know of the battery in flight; empty: nothing."""
+    if battery_is_low(i, p):
+        return f"the battery is at {i.battery:.0%}: {p.battery_action}"
+    if i.battery_silent_time == 0.0:
+        return ""
+    silence = f"nothing has been heard of the battery for {i.battery_silent_time:.0f} s"
+    when = "" if battery_is_silent(i, p) else f" at {p.battery_silent_time:g} s"
+    return f"{silence}: {p.battery_action}{when}"
+
+
 def battery_ends_the_flight(i: ModeInputs, p: ModeParameters) -> bool:
     """Return whether the battery demands a landing here."""
-    returned = i.is_home or i.battery_low_time > p.battery_time + p.return_timeout
-    lands = p.battery_action == "land" or (p.battery_action == "return" and returned)
-    return i.battery_critical_time > p.battery_time or (battery_is_low(i, p) and lands)
+    is_critical = i.battery_critical_time > p.battery_time
+    over = i.battery_low_time - p.battery_time
+    return is_critical or (battery_is_low(i, p) and _action_lands(i, p, over))
+
+
+def silence_ends_the_flight(i: ModeInputs, p: ModeParameters) -> bool:
+    """Return whether a battery that nothing is heard of demands a landing here."""
+    over = i.battery_silent_time - p.battery_silent_time
+    return battery_is_silent(i, p) and _action_lands(i, p, over)
+
+
+def _action_lands(i: ModeInputs, p: ModeParameters, over: float) -> bool:
+    """Return whether the action, due for ``over`` [s], is to land or a return that is done."""
+    returned = i.is_home or over > p.return_timeout
+    return p.battery_action == "land" or (p.battery_action == "return" and returned)

@@ -69,6 +69,7 @@ class ModeParameters:
     battery_critical: float = _fraction()  # [1] below it the aircraft lands whatever the action
     battery_time: float = _not_negative()  # [s] for which it must stay below
     battery_action: str = field(metadata={"choices": ("return", "land", "hover")})
+    battery_silent_time: float = _positive()  # [s] of silence after which it counts as low
     return_timeout: float = _positive()  # [s] after which a return ends in a landing on the spot
     home_radius: float = _positive()  # [m] horizontal, around where automatic flight began
     stick_centre: float = _fraction()  # [1] sticks this near count as centred
@@ -108,6 +109,7 @@ class ModeInputs:
     gps_lost_time: float = 0.0  # [s] for which it has been without good health, where it is needed
     battery_age: float = math.inf  # [s]
     battery: float = math.nan  # [1] state of charge
+    battery_silent_time: float = 0.0  # [s] since it was heard of, beyond `battery_timeout`; else 0
     battery_low_time: float = 0.0  # [s] for which it has been low
     battery_critical_time: float = 0.0  # [s] for which it has been critical
     is_home: bool = False  # holding position where automatic flight began

@@ -43,6 +43,7 @@ class Situation:
         self._brakes_after_start = False
         self._landing_granted = False
         self._was_away = self._switched = False
+        self._battery_heard: Optional[float] = None  # [s] steady clock, where it is silent since
         self._low_since: Optional[float] = None
         self._critical_since: Optional[float] = None
         self._gps_lost_since: Optional[float] = None
@@ -131,6 +132,7 @@ class Situation:
             effectless_time=self.effect.time,
             effectless_total=self.effect.total,
             landing_granted=self._landing_granted,
+            battery_silent_time=self._battery_silent_time(i),
             battery_low_time=low,
             battery_critical_time=critical,
             is_home=mode is Mode.HOVERING and ladder.goal is Goal.HOLD and self._is_home(i),
@@ -160,6 +162,13 @@ class Situation:
         is_up = i.telemetry.in_air and steady and i.height >= p.modes.take_off_height
         self._settled_since = _since(self._settled_since, is_up, i.now)
         return 0.0 if self._settled_since is None else i.now - self._settled_since
+
+    def _battery_silent_time(self, i: GuardInputs) -> float:
+        age = i.telemetry.battery_age
+        heard = i.now - age if math.isfinite(age) else i.now  # never: count from now
+        is_silent = age > self.params.modes.battery_timeout
+        self._battery_heard = _since(self._battery_heard, is_silent, heard)
+        return 0.0 if self._battery_heard is None else i.now - self._battery_heard
 
     def _battery_times(self, i: GuardInputs) -> Tuple[float, float]:
         p, battery = self.params.modes, i.telemetry.battery

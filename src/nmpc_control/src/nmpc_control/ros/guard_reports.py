@@ -179,7 +179,9 @@ class GuardReports:
         is_low = telemetry.battery < p.battery_start
         level = DiagnosticStatus.OK if is_known and not is_low else DiagnosticStatus.WARN
         level = DiagnosticStatus.ERROR if telemetry.battery < p.battery_low else level
-        status.summary(level, f"{telemetry.battery:.0%}" if is_known else "not heard of")
+        silence = f"not heard of for {telemetry.battery_age:.0f} s"
+        status.summary(level, f"{telemetry.battery:.0%}" if is_known else silence)
         status.add("when low", p.battery_action)
+        status.add("counts as low when silent for [s]", f"{p.battery_silent_time:g}")
         status.add("thrust left [%]", f"{100.0 * self._guard.battery_gain:.1f}")
         return status

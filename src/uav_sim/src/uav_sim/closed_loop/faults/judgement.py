@@ -85,11 +85,11 @@ def way(before: GuardOutput, outputs: List[Tuple[float, GuardOutput]]) -> List[s
 
 
 def reaction(before: GuardOutput, outputs: List[Tuple[float, GuardOutput]]) -> Optional[float]:
-    """Return when [s] the guard first did something else; None: never."""
+    """Return when [s] the guard first did something else, or told somebody to; None: never."""
     flew = before.rung in _ON_PLANS
     for t, output in outputs:
         same = (output.mode, output.code) == (before.mode, before.code)
-        if not same or flew != (output.rung in _ON_PLANS):
+        if not same or output.actions or flew != (output.rung in _ON_PLANS):
             return t
     return None
 
