@@ -11,7 +11,7 @@ from nmpc_control.guard_data import Action, GuardOutput
 from nmpc_control.ladder import Rung
 from nmpc_control.mode_inputs import Mode
 from uav_sim.closed_loop.faults import cli, matrix, runner
-from uav_sim.closed_loop.faults.judgement import failures, longest_gap, reaction, way
+from uav_sim.closed_loop.faults.judgement import failures, longest_gap, reaction, takeover, way
 from uav_sim.closed_loop.faults.kinds import TROUBLES
 from uav_sim.closed_loop.faults.matrix import (
     SITUATIONS,
@@ -21,7 +21,7 @@ from uav_sim.closed_loop.faults.matrix import (
 )
 from uav_sim.closed_loop.faults.page import page
 from uav_sim.closed_loop.faults.service_calls import ServiceCalls
-from uav_sim.config import config_directory
+from uav_sim.config import config_directory, load_yaml
 from uav_sim.errors import ConfigError
 from uav_sim.faults.kinds import KINDS
 
@@ -49,6 +49,23 @@ def test_every_kind_of_trouble_and_most_faults_of_the_simulator_are_in_it():
     assert set(KINDS) - {part.kind for part in parts} == {"battery_empty"}
 
 
+def test_what_nobody_notices_by_itself_is_part_of_pairs_only():
+    data = load_yaml(matrix.folder() / "faults.yaml")
+    for name in data["ingredients"]:
+        assert name not in load_cases()
+        assert any(name in pair["of"] for pair in data["pairs"].values())
+
+
+def test_how_long_setpoints_go_on_after_the_pilot_was_heard():
+    sent = [(round(0.02 * k, 2), AXES) for k in range(10)] + [(2.0, AXES)]
+    flight = SimpleNamespace(loop=SimpleNamespace(sent=sent, pilot_heard=0.1))
+    assert takeover(flight) == pytest.approx(0.08)
+    flight.loop.pilot_heard = 0.18
+    assert takeover(flight) == 0.0
+    flight.loop.pilot_heard = None
+    assert takeover(flight) == 0.0
+
+
 def test_the_page_says_what_the_files_say():
     document = config_directory().parent / "doc" / "fault_matrix.md"
     command = "run python -m uav_sim.closed_loop.faults.page"
@@ -64,6 +81,9 @@ def test_the_page_says_what_the_files_say():
         ("faults", "faults: {}\npairs: {p: {of: [x, y], situation: hover}}", "name of a fault"),
         ("expected", "rain: {all: {end: as before}}", "name of a fault"),
         ("expected", "rc_off: {all: {end: flies on}}", "a mode and a reason code"),
+        ("expected", "rc_off: {all: {by: manual pilot, end: manual pilot}}", "within: got inf"),
+        ("expected", "rc_off: {all: {end: manual pilot, within: 0.1}}", "by: got ''"),
+        ("expected", "no_landing: {all: {end: as before}}", "name of a fault"),
         ("expected", "rc_off: {fog: {end: as before}}", "one of all"),
     ],
 )
@@ -129,6 +149,7 @@ GOOD_ROW = {
     "reaction_s": 0.5,
     "collision": False,
     "collided_with": [],
+    "takeover_s": 0.0,
     "on_ground": False,
     "against_landing_s": 0.0,
 }
@@ -152,6 +173,8 @@ BRAKES = Expectation("braking no_plan", "braking no_plan", within=0.6)
         ({"command_gap_ms_max": 60.0}, BRAKES, "for 60 ms"),
         ({"reaction_s": 0.62}, BRAKES, "0.6 s are allowed"),
         ({"reaction_s": None}, BRAKES, "0.6 s are allowed"),
+        ({"takeover_s": 0.02}, BRAKES, None),
+        ({"takeover_s": 0.04}, BRAKES, "after the pilot was heard"),
         ({}, LANDS, "not on the ground"),
         ({"on_ground": True}, LANDS, None),
         ({"way": ["landing asked", "waiting landed"]}, LANDED, "not on the ground"),

@@ -11,6 +11,8 @@ from uav_sim.closed_loop.faults.flight import Flight
 from uav_sim.closed_loop.faults.matrix import AS_BEFORE, Case, Expectation
 
 Row = Dict[str, Any]
+TAKEOVER = 0.02  # [s] one period, in which the stream ends once the pilot's switch is heard
+_LOOK_AFTER = 0.5  # [s] for which that is looked at
 AGAINST_LANDING = 0.2  # [s] for which setpoints may go on: until the flight status is heard
 _LANDED = "waiting landed"
 _ON_PLANS = (Rung.NEW_PLAN, Rung.LAST_PLAN)
@@ -38,6 +40,7 @@ def row_of(case: Case, situation: str, flight: Flight, expected: Expectation) ->
         "nan_published": nan_count(flight),
         "command_gap_ms_max": round(1e3 * longest_gap(flight), 1),
         "reaction_s": None if reacted is None else round(reacted - (since or flight.t0), 3),
+        "takeover_s": takeover(flight),
         "on_ground": flight.loop.aircraft.plant.on_ground,
         "against_landing_s": round(flight.loop.against_landing, 3),
         "unavoidable": None,
@@ -65,6 +68,8 @@ def failures(row: Row, expected: Expectation) -> List[str]:
         late = row["reaction_s"]
         if late is None or late > expected.within + 1e-6:
             found.append(f"reacted after {late} s, {expected.within:g} s are allowed")
+    if row["takeover_s"] > TAKEOVER + 1e-6:
+        found.append(f"setpoints for {row['takeover_s']:g} s after the pilot was heard")
     if (expected.lands or expected.end == _LANDED) and not row["on_ground"]:
         found.append("it is not on the ground at the end")
     if row["against_landing_s"] > AGAINST_LANDING + 1e-6:
@@ -92,6 +97,15 @@ def reaction(before: GuardOutput, outputs: List[Tuple[float, GuardOutput]]) -> O
         if not same or output.actions or flew != (output.rung in _ON_PLANS):
             return t
     return None
+
+
+def takeover(flight: Flight) -> float:
+    """Return for how long [s] setpoints went on after the pilot's switch was heard."""
+    heard = flight.loop.pilot_heard
+    if heard is None:
+        return 0.0
+    late = [t - heard for t, _ in flight.loop.sent if 0.0 < t - heard <= _LOOK_AFTER]
+    return round(max(late, default=0.0), 3)
 
 
 def nan_count(flight: Flight) -> int:

@@ -50,11 +50,12 @@ class Expectation:
     """What must come of a case in a situation; modes with reason codes, "mode code"."""
 
     end: str = field()  # at the end of the flight; "as before": nothing changes
-    by: str = ""  # first change; empty: not looked at
+    by: str = ""  # first change; empty only with ``untimed``
     within: float = field(default=math.inf, metadata={"min": 0.0})  # [s] of that change
     gap_ms: float = field(default=40.0, metadata={"min": 0.0})  # of the stream, at most
     lands: bool = False  # stands on the ground at the end, on truth; always where it has landed
     unavoidable: bool = False  # whether a collision is expected that a checker calls so
+    untimed: str = ""  # why neither ``by`` nor ``within`` says anything
     why: str = ""
 
     @property
@@ -69,12 +70,18 @@ def folder() -> Path:
 
 
 def load_cases() -> Dict[str, Case]:
-    """Return all cases by name, faults first; raises ConfigError."""
+    """Return all cases by name, faults first; raises ConfigError.
+
+    What stands below ``ingredients`` goes wrong in pairs only.
+    """
     path = folder() / "faults.yaml"
     data = load_yaml(path)
     cases = {name: _case(name, item, path.name) for name, item in data["faults"].items()}
+    parts = dict(cases)
+    for name, item in (data.get("ingredients") or {}).items():
+        parts[name] = _case(name, item, path.name)
     for name, item in (data.get("pairs") or {}).items():
-        cases[name] = _pair(name, item, cases, path.name)
+        cases[name] = _pair(name, item, parts, path.name)
     return cases
 
 
@@ -153,8 +160,19 @@ def _expected(item: Any, situations: Tuple[str, ...], source: str) -> Dict[str, 
         merged = {"why": item.get("why", ""), **(item.get(situation, item.get("all")) or {})}
         expectation = from_dict(Expectation, merged, source, situation)
         _check_words([expectation.by, expectation.end], f"{source}: {situation}")
+        _check_time(expectation, f"{source}: {situation}")
         result[situation] = expectation
     return result
+
+
+def _check_time(e: Expectation, source: str) -> None:
+    """Refuse a change that nothing says the time of, or that none is expected to begin with."""
+    if e.end == AS_BEFORE or e.untimed:
+        return
+    if not math.isfinite(e.within):
+        raise ConfigError(source, "within", e.within, "a time in s, or why not as `untimed`")
+    if not e.by:
+        raise ConfigError(source, "by", e.by, "the first change, or why not as `untimed`")
 
 
 def _check_words(texts: List[str], source: str) -> None:

@@ -41,7 +41,10 @@ have, calls of `dji_sdk` are repeated as they repeat them, an exception ends no 
 - The first change of mode and reason code and the one at the end are as expected ("as before": there is none).
 - Every setpoint that left is finite, all flight long.
 - No two setpoints are more than 40 ms apart while a mode streams; where the guard itself stands still, no more than the row says.
-- The guard reacts within the time that the row gives, counted from the fault, or from when the pilot's switch is heard.
+- The guard reacts within the time that the row gives, counted from the fault, or from when the pilot's switch is heard: another mode, reason or
+  rung, or an order to the controller. Rows without such a time say why. It follows from the parameters: the timeout, one message (20 ms; the battery's
+  100 ms), at most 60 ms of transport and ticks.
+- Once the pilot's switch is heard to leave F, no setpoint leaves later than one period (20 ms), whatever else there is.
 - What has landed, and what else is expected on the ground, stands there at the end, on truth. No setpoint leaves later than 0.2 s after DJI's
   own landing began.
 - Nothing is hit, on truth, between samples. Where something is, the same flight is flown again eleven times, each time with one setpoint from
@@ -50,7 +53,7 @@ have, calls of `dji_sdk` are repeated as they repeat them, an exception ends no 
 
 `build/faults.json` has `rows` with `fault`, `situation`, `final_mode`, `reason` (of the last change; empty: none), `expected_mode`, `collision`,
 `nan_published` (setpoints that were not finite), `command_gap_ms_max`, `reaction_s`, `passed`, and `way` (all changes), `expected`,
-`on_ground`, `against_landing_s` (how long setpoints went on into DJI's own landing),
+`on_ground`, `takeover_s` (how long setpoints went on after the pilot was heard), `against_landing_s` (how long setpoints went on into DJI's own landing),
 `collided_with`, `clearance_m`, `unavoidable`, `failures` in words; beside them `collisions`, `unavoidable`, `failed`, `passed`, machine and versions.
 
 What is expected follows from the ladder ([modes](../../nmpc_control/doc/modes.md)), not from what was flown. [Faults](faults.md) has the
@@ -92,7 +95,8 @@ def _line(*cells: str) -> str:
 
 
 def _why(expected: Dict[str, Expectation]) -> str:
-    reasons = [e.why for e in expected.values() if e.why and e.why != "the same"]
+    texts = [text for e in expected.values() for text in (e.untimed, e.why)]
+    reasons = [text for text in texts if text and text != "the same"]
     return "; ".join(dict.fromkeys(reasons))
 
 

@@ -85,6 +85,7 @@ def failed_row(job: Job, error: str) -> Row:
         "nan_published": 0,
         "command_gap_ms_max": 0.0,
         "reaction_s": None,
+        "takeover_s": 0.0,
         "on_ground": False,
         "against_landing_s": 0.0,
         "unavoidable": None,
