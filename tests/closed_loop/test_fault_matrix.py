@@ -8,6 +8,7 @@ import dataclasses
 
 import pytest
 
+from nmpc_control.dji import VELOCITY
 from uav_sim.closed_loop.faults.escape import way_out
 from uav_sim.closed_loop.faults.flight import fly
 from uav_sim.closed_loop.faults.judgement import row_of
@@ -80,6 +81,25 @@ def without_rc(loop):
 )
 def test_twin_with_the_protection_off_the_row_fails(name, situation, off):
     assert not flown(name, situation, off)["passed"]
+
+
+def holding_at(vx, vz):
+    """Return what makes DJI's velocity hold move [m/s] instead."""
+
+    def prepare(loop):
+        send = loop.send
+        loop.send = lambda axes: send((vx, 0.0, vz, 0.0, axes[4]) if axes[4] == VELOCITY else axes)
+
+    return prepare
+
+
+@pytest.mark.parametrize(
+    ("velocity", "words"), [((0.0, -0.5), "sinks by"), ((0.5, 0.0), "moves at 0.")]
+)
+def test_twin_a_hold_that_sinks_or_does_not_brake_fails(velocity, words):
+    row = flown("controller_dead", "hover", holding_at(*velocity))
+    assert row["way"] == ["braking no_plan"], "nothing but the motion tells"
+    assert any(words in failure for failure in row["failures"])
 
 
 def deaf_to_answers(loop):

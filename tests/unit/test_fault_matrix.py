@@ -3,6 +3,7 @@
 
 import json
 from dataclasses import replace
+from math import inf
 from types import SimpleNamespace
 
 import pytest
@@ -11,7 +12,15 @@ from nmpc_control.guard_data import Action, GuardOutput
 from nmpc_control.ladder import Rung
 from nmpc_control.mode_inputs import Mode
 from uav_sim.closed_loop.faults import cli, matrix, runner
-from uav_sim.closed_loop.faults.judgement import failures, longest_gap, reaction, takeover, way
+from uav_sim.closed_loop.faults.judgement import (
+    end_speed,
+    failures,
+    longest_gap,
+    reaction,
+    sinks,
+    takeover,
+    way,
+)
 from uav_sim.closed_loop.faults.kinds import TROUBLES
 from uav_sim.closed_loop.faults.matrix import (
     SITUATIONS,
@@ -56,6 +65,30 @@ def test_what_nobody_notices_by_itself_is_part_of_pairs_only():
         assert any(name in pair["of"] for pair in data["pairs"].values())
 
 
+def test_what_holds_must_rest_and_what_flies_must_not_sink_unless_a_row_says_why():
+    expected = load_expectations()
+    motion = {
+        name: {s: (e.rests, e.sinks) for s, e in expected[name].items()}
+        for name in ("controller_dead", "solver_stalls_2", "obstacles_old", "rc_off", "rc_frozen")
+    }
+    free, flies, holds = (inf, inf), (inf, 1.0), (0.3, 1.0)
+    assert motion["controller_dead"] == dict.fromkeys(SITUATIONS, holds)
+    assert motion["solver_stalls_2"] == {"hover": holds, "turn": flies, "beside": flies}
+    assert motion["obstacles_old"] == dict.fromkeys(SITUATIONS, holds)
+    assert motion["rc_off"] == dict.fromkeys(SITUATIONS, free)
+    assert motion["rc_frozen"] == {"hover": holds, "turn": flies, "beside": flies}
+
+
+def test_motion_on_truth():
+    heights = [(0.9, 14.0), (1.0, 12.0), (1.5, 11.2), (2.0, 12.5)]
+    truths = [SimpleNamespace(t=t, position=(0.0, 0.0, z)) for t, z in heights]
+    aircraft = SimpleNamespace(truth=SimpleNamespace(velocity=(0.3, 0.0, -0.4)))
+    loop = SimpleNamespace(log=SimpleNamespace(truths=truths), aircraft=aircraft)
+    flight = SimpleNamespace(loop=loop, t0=1.0)
+    assert sinks(flight) == pytest.approx(0.8)
+    assert end_speed(flight) == pytest.approx(0.5)
+
+
 def test_how_long_setpoints_go_on_after_the_pilot_was_heard():
     sent = [(round(0.02 * k, 2), AXES) for k in range(10)] + [(2.0, AXES)]
     flight = SimpleNamespace(loop=SimpleNamespace(sent=sent, pilot_heard=0.1))
@@ -83,6 +116,11 @@ def test_the_page_says_what_the_files_say():
         ("expected", "rc_off: {all: {end: flies on}}", "a mode and a reason code"),
         ("expected", "rc_off: {all: {by: manual pilot, end: manual pilot}}", "within: got inf"),
         ("expected", "rc_off: {all: {end: manual pilot, within: 0.1}}", "by: got ''"),
+        (
+            "expected",
+            "rc_frozen: {all: {end: as before, sinks: 2.0}}",
+            "why sinks is not at most 1",
+        ),
         ("expected", "no_landing: {all: {end: as before}}", "name of a fault"),
         ("expected", "rc_off: {fog: {end: as before}}", "one of all"),
     ],
@@ -150,6 +188,8 @@ GOOD_ROW = {
     "collision": False,
     "collided_with": [],
     "takeover_s": 0.0,
+    "sinks_m": 0.2,
+    "end_speed_m_s": 0.5,
     "on_ground": False,
     "against_landing_s": 0.0,
 }
@@ -173,6 +213,10 @@ BRAKES = Expectation("braking no_plan", "braking no_plan", within=0.6)
         ({"command_gap_ms_max": 60.0}, BRAKES, "for 60 ms"),
         ({"reaction_s": 0.62}, BRAKES, "0.6 s are allowed"),
         ({"reaction_s": None}, BRAKES, "0.6 s are allowed"),
+        ({}, replace(BRAKES, rests=0.3), "moves at 0.5 m/s"),
+        ({}, replace(BRAKES, rests=0.6), None),
+        ({}, replace(BRAKES, sinks=0.1), "sinks by 0.2 m, 0.1 m are allowed"),
+        ({}, replace(BRAKES, sinks=0.3), None),
         ({"takeover_s": 0.02}, BRAKES, None),
         ({"takeover_s": 0.04}, BRAKES, "after the pilot was heard"),
         ({}, LANDS, "not on the ground"),

@@ -41,6 +41,8 @@ def row_of(case: Case, situation: str, flight: Flight, expected: Expectation) ->
         "command_gap_ms_max": round(1e3 * longest_gap(flight), 1),
         "reaction_s": None if reacted is None else round(reacted - (since or flight.t0), 3),
         "takeover_s": takeover(flight),
+        "sinks_m": sinks(flight),
+        "end_speed_m_s": end_speed(flight),
         "on_ground": flight.loop.aircraft.plant.on_ground,
         "against_landing_s": round(flight.loop.against_landing, 3),
         "unavoidable": None,
@@ -70,6 +72,10 @@ def failures(row: Row, expected: Expectation) -> List[str]:
             found.append(f"reacted after {late} s, {expected.within:g} s are allowed")
     if row["takeover_s"] > TAKEOVER + 1e-6:
         found.append(f"setpoints for {row['takeover_s']:g} s after the pilot was heard")
+    if row["sinks_m"] > expected.sinks + 1e-6:
+        found.append(f"sinks by {row['sinks_m']:g} m, {expected.sinks:g} m are allowed")
+    if row["end_speed_m_s"] > expected.rests + 1e-6:
+        found.append(f"moves at {row['end_speed_m_s']:g} m/s at the end")
     if (expected.lands or expected.end == _LANDED) and not row["on_ground"]:
         found.append("it is not on the ground at the end")
     if row["against_landing_s"] > AGAINST_LANDING + 1e-6:
@@ -106,6 +112,17 @@ def takeover(flight: Flight) -> float:
         return 0.0
     late = [t - heard for t, _ in flight.loop.sent if 0.0 < t - heard <= _LOOK_AFTER]
     return round(max(late, default=0.0), 3)
+
+
+def sinks(flight: Flight) -> float:
+    """Return by how much [m] the aircraft came below where it was as the case began, on truth."""
+    heights = [truth.position[2] for truth in flight.loop.log.truths if truth.t >= flight.t0 - 0.01]
+    return round(heights[0] - min(heights), 3)
+
+
+def end_speed(flight: Flight) -> float:
+    """Return the speed [m/s] at the end, on truth."""
+    return round(math.sqrt(sum(v * v for v in flight.loop.aircraft.truth.velocity)), 3)
 
 
 def nan_count(flight: Flight) -> int:

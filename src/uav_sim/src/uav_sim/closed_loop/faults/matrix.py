@@ -6,9 +6,9 @@ of each. The second one is written from the design, not from what the code does.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Tuple
+from typing import Any, Dict, List, Mapping, Set, Tuple
 
 from nmpc_control.mode_inputs import Mode
 from uav_sim.closed_loop.faults.kinds import make_trouble
@@ -18,6 +18,8 @@ from uav_sim.faults.kinds import make_fault
 
 SITUATIONS = ("hover", "turn", "beside")
 AS_BEFORE = "as before"
+AT_REST = 0.3  # [m/s] at most where it holds; brake.rest_speed, and DJI's own hold anchors there
+HEIGHT_LOSS = 1.0  # [m] at most in automatic flight
 _PART_KEYS = ("fault", "trouble", "after", "duration")
 
 
@@ -53,6 +55,8 @@ class Expectation:
     by: str = ""  # first change; empty only with ``untimed``
     within: float = field(default=math.inf, metadata={"min": 0.0})  # [s] of that change
     gap_ms: float = field(default=40.0, metadata={"min": 0.0})  # of the stream, at most
+    rests: float = field(default=math.inf, metadata={"min": 0.0})  # [m/s] at the end, on truth
+    sinks: float = field(default=math.inf, metadata={"min": 0.0})  # [m] below where it was
     lands: bool = False  # stands on the ground at the end, on truth; always where it has landed
     unavoidable: bool = False  # whether a collision is expected that a checker calls so
     untimed: str = ""  # why neither ``by`` nor ``within`` says anything
@@ -161,8 +165,23 @@ def _expected(item: Any, situations: Tuple[str, ...], source: str) -> Dict[str, 
         expectation = from_dict(Expectation, merged, source, situation)
         _check_words([expectation.by, expectation.end], f"{source}: {situation}")
         _check_time(expectation, f"{source}: {situation}")
-        result[situation] = expectation
+        result[situation] = _with_motion(expectation, situation, set(merged), source)
     return result
+
+
+def _with_motion(e: Expectation, situation: str, given: Set[str], source: str) -> Expectation:
+    """Return the expectation with what holds for motion where the row says nothing of its own."""
+    before = "hovering" if situation == "hover" else "flying"
+    mode = before if e.end == AS_BEFORE else e.mode
+    holds = mode in ("hovering", "braking") or e.end.endswith("held_back")
+    flies = mode in ("flying", "hovering", "braking")
+    usual = {"rests": AT_REST if holds else math.inf, "sinks": HEIGHT_LOSS if flies else math.inf}
+    for name, limit in usual.items():
+        if name in given and getattr(e, name) > limit and not e.why:
+            raise ConfigError(
+                f"{source}: {situation}", "why", "", f"why {name} is not at most {limit:g}"
+            )
+    return replace(e, **{name: usual[name] for name in usual if name not in given})
 
 
 def _check_time(e: Expectation, source: str) -> None:

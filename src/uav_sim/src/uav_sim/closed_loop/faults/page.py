@@ -7,6 +7,8 @@ from typing import Dict, List, Optional
 
 from uav_sim.closed_loop.faults.matrix import (
     AS_BEFORE,
+    AT_REST,
+    HEIGHT_LOSS,
     SITUATIONS,
     Case,
     Expectation,
@@ -45,6 +47,8 @@ have, calls of `dji_sdk` are repeated as they repeat them, an exception ends no 
   rung, or an order to the controller. Rows without such a time say why. It follows from the parameters: the timeout, one message (20 ms; the battery's
   100 ms), at most 60 ms of transport and ticks.
 - Once the pilot's switch is heard to leave F, no setpoint leaves later than one period (20 ms), whatever else there is.
+- What ends flying, hovering or braking comes nowhere more than 1 m below where it was; what ends hovering, braking or held back rests then, at
+  0.3 m/s or less; both on truth, and unless the row says otherwise, and why.
 - What has landed, and what else is expected on the ground, stands there at the end, on truth. No setpoint leaves later than 0.2 s after DJI's
   own landing began.
 - Nothing is hit, on truth, between samples. Where something is, the same flight is flown again eleven times, each time with one setpoint from
@@ -53,7 +57,7 @@ have, calls of `dji_sdk` are repeated as they repeat them, an exception ends no 
 
 `build/faults.json` has `rows` with `fault`, `situation`, `final_mode`, `reason` (of the last change; empty: none), `expected_mode`, `collision`,
 `nan_published` (setpoints that were not finite), `command_gap_ms_max`, `reaction_s`, `passed`, and `way` (all changes), `expected`,
-`on_ground`, `takeover_s` (how long setpoints went on after the pilot was heard), `against_landing_s` (how long setpoints went on into DJI's own landing),
+`sinks_m`, `end_speed_m_s`, `on_ground`, `takeover_s` (how long setpoints went on after the pilot was heard), `against_landing_s` (how long setpoints went on into DJI's own landing),
 `collided_with`, `clearance_m`, `unavoidable`, `failures` in words; beside them `collisions`, `unavoidable`, `failed`, `passed`, machine and versions.
 
 What is expected follows from the ladder ([modes](../../nmpc_control/doc/modes.md)), not from what was flown. [Faults](faults.md) has the
@@ -110,6 +114,8 @@ def _words(expectation: Expectation) -> str:
         words += f"; within {e.within:g} s"
     if e.gap_ms != Expectation(end=AS_BEFORE).gap_ms:
         words += f"; silent for at most {e.gap_ms:g} ms"
+    words += f"; sinks by at most {e.sinks:g} m" if HEIGHT_LOSS != e.sinks < float("inf") else ""
+    words += f"; at most {e.rests:g} m/s at the end" if AT_REST != e.rests < float("inf") else ""
     words += "; on the ground" if e.lands else ""
     return words + ("; collides, unavoidably" if e.unavoidable else "")
 

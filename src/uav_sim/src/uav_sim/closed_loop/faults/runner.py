@@ -86,6 +86,8 @@ def failed_row(job: Job, error: str) -> Row:
         "command_gap_ms_max": 0.0,
         "reaction_s": None,
         "takeover_s": 0.0,
+        "sinks_m": 0.0,
+        "end_speed_m_s": 0.0,
         "on_ground": False,
         "against_landing_s": 0.0,
         "unavoidable": None,
