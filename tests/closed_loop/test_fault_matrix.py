@@ -10,7 +10,7 @@ import pytest
 
 from nmpc_control.dji import VELOCITY
 from uav_sim.closed_loop.faults.escape import way_out
-from uav_sim.closed_loop.faults.flight import fly
+from uav_sim.closed_loop.faults.flight import FAULT_AT, fly
 from uav_sim.closed_loop.faults.judgement import row_of
 from uav_sim.closed_loop.faults.matrix import load_cases, load_expectations
 from uav_sim.closed_loop.faults.runner import judged
@@ -88,7 +88,12 @@ def holding_at(vx, vz):
 
     def prepare(loop):
         send = loop.send
-        loop.send = lambda axes: send((vx, 0.0, vz, 0.0, axes[4]) if axes[4] == VELOCITY else axes)
+
+        def moved(axes):
+            holds = loop.t > FAULT_AT["hover"] and axes[4] == VELOCITY
+            send((vx, 0.0, vz, 0.0, axes[4]) if holds else axes)
+
+        loop.send = moved
 
     return prepare
 
