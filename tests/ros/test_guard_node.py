@@ -13,11 +13,22 @@ BRAKE, VELOCITY = 3, 73.0
 @pytest.fixture
 def flight(ros):
     """Simulator, controller and guard; the guard ends only when a test ends it."""
+    return started(ros, "")
+
+
+@pytest.fixture
+def flight_without_terminal(ros):
+    """The same, and whatever controller and guard print fails: nobody reads it any more."""
+    return started(ros, " 2>&1 | true")
+
+
+def started(ros, output):
     ros.launch("uav_sim", "simulator.launch")
     ros.wait_for_node("/uav_sim")
     nodes = ("flight_guard", "nmpc_controller")
     for name in nodes:
-        ros.start("rosrun", "nmpc_control", name, "_vehicle:=dji_hil", "_simulated:=true")
+        command = f"rosrun nmpc_control {name} _vehicle:=dji_hil _simulated:=true"
+        ros.start("bash", "-c", f"exec {command}" if not output else command + output)
     for name in nodes:
         ros.wait_for_node(f"/{name}")
     return ros
@@ -51,8 +62,8 @@ def test_a_dead_controller_leaves_a_held_aircraft_that_still_lands(flight):
     assert "Traceback" not in flight.output()
 
 
-def test_the_pilot_silences_the_stream_and_only_a_new_start_resumes(flight):
-    seen = flight.run_json("guard_client.py", "pilot_takes_over", timeout=120)
+def test_the_pilot_silences_the_stream_and_only_a_new_start_resumes(flight_without_terminal):
+    seen = flight_without_terminal.run_json("guard_client.py", "pilot_takes_over", timeout=120)
     assert seen["task"] == 1, "authority was not given back"
     assert seen["last_setpoint_after"] < 0.0
     assert seen["start"] == [True, "braking to hover"]

@@ -44,6 +44,7 @@ from nmpc_control.mode_inputs import FOLLOWED, PLANNED
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import Parameters, load_parameters, load_weights
 from nmpc_control.ros.commands import Commands
+from nmpc_control.ros.log_thread import logging_in_a_thread
 from nmpc_control.ros.obstacle_port import ObstaclePort
 from nmpc_control.ros.publishers import Publishers
 from nmpc_control.ros.resume_service import ResumeService
@@ -290,4 +291,5 @@ def main() -> None:
     except NmpcError as error:
         rospy.logfatal(str(error))
         sys.exit(2)
-    node.run()
+    with logging_in_a_thread():
+        node.run()

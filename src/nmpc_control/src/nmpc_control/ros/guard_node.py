@@ -44,6 +44,7 @@ from nmpc_control.ros.departure import Departure
 from nmpc_control.ros.dji_services import DjiServices
 from nmpc_control.ros.guard_listener import GuardListener
 from nmpc_control.ros.guard_reports import GuardReports
+from nmpc_control.ros.log_thread import logging_in_a_thread
 from nmpc_control.ros.obstacle_services import ObstacleServices
 from nmpc_control.ros.source_switch import SourceSwitch
 
@@ -221,7 +222,8 @@ def main() -> None:
         node = GuardNode(guard, bool(rospy.get_param("~avoidance", True)))
         gc.collect()
         gc.freeze()  # or now and then a tick would wait until all modules were looked through again
-        node.run()
+        with logging_in_a_thread():
+            node.run()
     except NmpcError as error:
         rospy.logfatal(str(error))
         sys.exit(2)
