@@ -76,6 +76,21 @@ def test_the_pilot_silences_the_stream_and_only_a_new_start_resumes(flight_witho
     assert {"pilot", "pilot_gave_back", "asked", "recovered", "goal"} <= set(seen["codes"])
 
 
+def test_nobody_takes_off_who_was_told_of_no_answer():
+    pytest.importorskip("nmpc_msgs", reason="the workspace is not built or not sourced")
+    from nmpc_control.ros.guard_node import Request, _Question
+
+    late = _Question(Request.START)
+    assert late.give_up() and not late.take_up()
+    assert late.answer == (False, "the guard did not answer: nothing is done")
+    in_time = _Question(Request.START)
+    assert in_time.take_up() and not in_time.give_up()
+    for harmless in (Request.HOVER, Request.RELEASE):
+        late = _Question(harmless)
+        assert late.give_up() and late.take_up()
+        assert late.answer == (False, "the guard did not answer: it acts as soon as it runs")
+
+
 def test_thrust_is_not_commanded_through_a_map_of_no_airframe(monkeypatch):
     pytest.importorskip("nmpc_msgs", reason="the workspace is not built or not sourced")
     from nmpc_control.ros import guard_node
