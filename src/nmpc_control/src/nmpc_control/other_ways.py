@@ -23,6 +23,7 @@ from nmpc_control.state import NU, NX, POSITION, VELOCITY
 
 _PAUSE = 3  # ticks from one try to the next while there is a solution
 _AT_ONCE = 3  # sides tried in a tick without one; the others one a tick, for a tick has to end
+_ROUNDS, _WORTH_MORE = 4, 2.0  # of iterations, for what may yet become better than what there is
 _BETTER = 0.95  # of its cost: what is dearer than this is no reason to change
 _SHORT_CUT = 1e6  # [1/m] of entering margins by more than a touch
 _TOUCH_SOON, _SOON, _TOUCH = 0.02, 2.0, 0.1  # [m] of a touch now, and from these [s] ahead on
@@ -152,6 +153,11 @@ class OtherWays:
             instance = problem.instance(seats, [way, reference])
             other = solver.solve(instance, self._guess(solver, problem, way))
             merit = _merit(other, problem.short_cut(field, other))
+            for _ in range(_ROUNDS):
+                if other.status != "budget" or merit > _WORTH_MORE * least:
+                    break
+                other = solver.solve(instance, other.guess)
+                merit = _merit(other, problem.short_cut(field, other))
             if other.found and merit < _BETTER * least:
                 least = merit
                 best = Choice(other, seats)
