@@ -2,6 +2,7 @@
 """Ways round that one local solution does not find, and a side that is kept."""
 
 import dataclasses
+import sys
 
 import numpy as np
 import pytest
@@ -167,7 +168,7 @@ def test_a_dead_end_is_left_for_the_side_that_is_open(nmpc):
 
 def test_a_long_way_round_is_worked_out_before_it_is_judged(nmpc, monkeypatch):
     """Around four large spheres the first iterations are still dearer than to wait."""
-    monkeypatch.setattr("test_other_ways.SPEED", 1.0)
+    monkeypatch.setattr(sys.modules[__name__], "SPEED", 1.0)
     places = {
         "over": (0.0, 2.08),
         "under": (0.0, -2.08),

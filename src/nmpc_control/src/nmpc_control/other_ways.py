@@ -8,7 +8,7 @@ cheaper by more than a little replaces the solution; the little keeps the side f
 
 import math
 from dataclasses import dataclass
-from typing import List, Optional, Protocol, Sequence
+from typing import List, Optional, Protocol, Sequence, Tuple
 
 import numpy as np
 
@@ -117,13 +117,20 @@ class OtherWays:
         self._shooting = shooting
 
     def improve(
-        self, solver: Solver, problem: Posed, solution: Solution, slots: Slots, at_once: bool
+        self,
+        solver: Solver,
+        problem: Posed,
+        instance: Instance,
+        solution: Solution,
+        slots: Slots,
+        at_once: bool,
     ) -> "Choice":
         """Return the solution with its slots, or a much better one with its own.
 
         Args:
             solver: the backend.
             problem: what is solved.
+            instance: its numbers, with the obstacles in their slots.
             solution: what it found from its own guess.
             slots: where the obstacles sit in it.
             at_once: whether it had none to begin with, or found none: all sides are tried then,
@@ -140,8 +147,20 @@ class OtherWays:
         now = at_once or short_cut > 0.0 or self._owed
         if not (now or self._ticks % _PAUSE == 0):  # else a try now and then is enough
             return best
-        least = _merit(solution, short_cut)
         reference = problem.eased_reference()
+        rounds = 0 if at_once else _ROUNDS  # a plan waits for those at once
+
+        def worked_out(posed: Instance, found: Solution, most: float) -> Tuple[Solution, float]:
+            merit = _merit(found, problem.short_cut(field, found))
+            for _ in range(rounds):
+                if found.status != "budget" or merit > most:
+                    break
+                found = solver.solve(posed, found.guess)
+                merit = _merit(found, problem.short_cut(field, found))
+            return found, merit
+
+        solution, least = worked_out(instance, solution, math.inf)  # or who came first would lose
+        best = Choice(solution, slots)
         ways = [self._stay(problem)] if short_cut > 0.0 else []
         across = sides(reference[-1] - reference[0])
         for index in self._due(at_once):
@@ -150,14 +169,9 @@ class OtherWays:
             if way is None:
                 continue
             seats = slots.copy()
-            instance = problem.instance(seats, [way, reference])
-            other = solver.solve(instance, self._guess(solver, problem, way))
-            merit = _merit(other, problem.short_cut(field, other))
-            for _ in range(_ROUNDS):
-                if other.status != "budget" or merit > _WORTH_MORE * least:
-                    break
-                other = solver.solve(instance, other.guess)
-                merit = _merit(other, problem.short_cut(field, other))
+            posed = problem.instance(seats, [way, reference])
+            tried = solver.solve(posed, self._guess(solver, problem, way))
+            other, merit = worked_out(posed, tried, _WORTH_MORE * least)
             if other.found and merit < _BETTER * least:
                 least = merit
                 best = Choice(other, seats)
