@@ -7,11 +7,10 @@ from typing import Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from nmpc_control import constraints
 from nmpc_control.ipopt import IpoptSolver
 from nmpc_control.model import DISTURBANCE
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.ocp import PARTS, Instance, Structure
+from nmpc_control.ocp import PARTS, Structure
 from nmpc_control.other_ways import OtherWays, Posed
 from nmpc_control.packing import check_arguments, pack_theta
 from nmpc_control.params import Parameters
@@ -44,7 +43,7 @@ class Nmpc:
         )
         self._last: Optional[Solution] = None
         self._last_t = 0.0
-        self._solved: Optional[Tuple[Posed, Instance]] = None  # until other ways were looked for
+        self._solved: Optional[Posed] = None  # the last problem, until other ways were looked for
         self._slots = Slots(p.obstacle_slots)
         self._other_ways = OtherWays(parameters.avoidance.guides, shooting=p.backend == "compiled")
         self.held_up_by: Tuple[str, ...] = ()  # obstacles before which the last plan waits
@@ -112,10 +111,10 @@ class Nmpc:
         guess, reference = self._guess(t), x_ref[:, POSITION]
         path = reference if guess is None else guess.states[:, POSITION]
         instance = problem.instance(self._slots, [path, reference])
-        if guess is not None and guess.multipliers is not None:
-            guess.multipliers[:, [constraints.PILOT_BOUNDS + i for i in self._slots.renewed]] = 0.0
+        if guess is not None:
+            guess = self._slots.forgotten(guess)
         solution = self.solver.solve(instance, guess)
-        self._solved = (problem, instance) if problem.obstacles else None
+        self._solved = problem if problem.obstacles else None
         self._last, self._last_t = solution if solution.found else None, t
         if problem.obstacles:
             if guess is None or not solution.found:
@@ -134,10 +133,10 @@ class Nmpc:
 
     def _look_further(self, solution: Solution, at_once: bool) -> Solution:
         """Return the best solution of the last problem that is known now, and go on from it."""
-        solved, self._solved = self._solved, None
-        if solved is None:
+        problem, self._solved = self._solved, None
+        if problem is None:
             return solution
-        choice = self._other_ways.improve(self.solver, *solved, solution, self._slots, at_once)
+        choice = self._other_ways.improve(self.solver, problem, solution, self._slots, at_once)
         self._slots = choice.slots
         self._last = choice.solution if choice.solution.found else None
         return choice.solution

@@ -62,6 +62,11 @@ class Posed:
         data = slots.fill(self.obstacles, self.times, paths, self.margin, self.reach, self.between)
         return self._with(self.x_ref, data, self.theta)
 
+    def again(self, slots: Slots, solution: Solution) -> Tuple[Instance, Guess]:
+        """Return the problem as the next tick would pose it, and where it would begin."""
+        path, reference = solution.states[:, POSITION], self.x_ref[:, POSITION]
+        return self.instance(slots, [path, reference]), slots.forgotten(solution.guess)
+
     def short_cut(self, field: ObstacleField, solution: Solution) -> float:
         """Return how much deeper [m] a solution leads into margins than the aircraft is now.
 
@@ -120,7 +125,6 @@ class OtherWays:
         self,
         solver: Solver,
         problem: Posed,
-        instance: Instance,
         solution: Solution,
         slots: Slots,
         at_once: bool,
@@ -130,7 +134,6 @@ class OtherWays:
         Args:
             solver: the backend.
             problem: what is solved.
-            instance: its numbers, with the obstacles in their slots.
             solution: what it found from its own guess.
             slots: where the obstacles sit in it.
             at_once: whether it had none to begin with, or found none: all sides are tried then,
@@ -150,17 +153,16 @@ class OtherWays:
         reference = problem.eased_reference()
         rounds = 0 if at_once else _ROUNDS  # a plan waits for those at once
 
-        def worked_out(posed: Instance, found: Solution, most: float) -> Tuple[Solution, float]:
+        def worked_out(found: Solution, seats: Slots, most: float) -> Tuple[Solution, float]:
             merit = _merit(found, problem.short_cut(field, found))
             for _ in range(rounds):
                 if found.status != "budget" or merit > most:
                     break
-                found = solver.solve(posed, found.guess)
+                found = solver.solve(*problem.again(seats, found))
                 merit = _merit(found, problem.short_cut(field, found))
             return found, merit
 
-        solution, least = worked_out(instance, solution, math.inf)  # or who came first would lose
-        best = Choice(solution, slots)
+        _, least = worked_out(solution, slots.copy(), math.inf)  # or who came first would lose
         ways = [self._stay(problem)] if short_cut > 0.0 else []
         across = sides(reference[-1] - reference[0])
         for index in self._due(at_once):
@@ -171,7 +173,7 @@ class OtherWays:
             seats = slots.copy()
             posed = problem.instance(seats, [way, reference])
             tried = solver.solve(posed, self._guess(solver, problem, way))
-            other, merit = worked_out(posed, tried, _WORTH_MORE * least)
+            other, merit = worked_out(tried, seats, _WORTH_MORE * least)
             if other.found and merit < _BETTER * least:
                 least = merit
                 best = Choice(other, seats)
