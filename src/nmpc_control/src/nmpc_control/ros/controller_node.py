@@ -137,7 +137,7 @@ class ControllerNode:
             self.controller.record_input(sent, None if u is None else np.array(u))
         while not self._requests.empty():
             self._requests.get_nowait()(t)
-        self.controller.obstacles, _ = self._port.look(t)
+        self.controller.obstacles, _ = self._port.look(t, self.controller.estimator)
         self.publishers.obstacles(t, self.controller.obstacles)
         pursued = self.controller.itinerary.is_pursuing
         clock_start = self.controller.itinerary.clock_start
