@@ -178,17 +178,21 @@ class ObstaclePort:
 
     def _work(self) -> None:
         while not rospy.is_shutdown():
-            due = self._next()
-            for key, heard in due:
-                self._unplaced.pop(key, None)
-                self._try(key, heard, counted=False)
-            now = time.monotonic()
-            for key, late in list(self._unplaced.items()):
-                if now >= late.retry:
-                    del self._unplaced[key]
-                    self._try(key, late.heard, late.counted)
-            if not due:
+            if not self._take_in():
                 time.sleep(_IDLE)
+
+    def _take_in(self) -> bool:
+        """Take in what may be read now, and look again for frames; return if anything came."""
+        due = self._next()
+        for key, heard in due:
+            self._unplaced.pop(key, None)
+            self._try(key, heard, counted=False)
+        now = time.monotonic()
+        for key, late in list(self._unplaced.items()):
+            if now >= late.retry:
+                del self._unplaced[key]
+                self._try(key, late.heard, late.counted)
+        return bool(due)
 
     def _try(self, key: Tuple[str, str], heard: _Heard, counted: bool) -> None:
         topic, sender = key
