@@ -41,7 +41,7 @@ class Summary(NamedTuple):
     known: int  # [1]
     moving: int  # [1]
     oldest: float  # [s] age of the oldest information about a moving one; 0 without any
-    senders: Tuple[str, ...]  # of whom a list was taken
+    senders: Tuple[str, ...]  # of whom something is known
     rejected: Dict[str, int]  # [1] entries by kind
     left_out: int = 0  # [1] farther than those that count
 
@@ -246,7 +246,7 @@ class ObstacleMemory:
         stamps = [track.obstacle.stamp for track in self._moving()]
         known, oldest = len(self.obstacles(t)), t - min(stamps, default=t)
         left_out = len(tuple(self._current(t))) - known
-        names, rejected = self._senders.names, dict(self.rejected)
+        names, rejected = tuple(map(self._senders.label, self._tracks)), dict(self.rejected)
         return Summary(known, len(stamps), oldest, names, rejected, left_out)
 
     def _out_of_time(self, t: float, s: Sighting, old: Optional[_Track]) -> str:

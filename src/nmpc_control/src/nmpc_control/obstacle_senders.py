@@ -18,7 +18,6 @@ class _Sender:
     taken: Optional[float]  # [s] its last list, or first word, came; None: before the clock jumped
     latches: bool = False
     refusal: str = ""  # why its newest list was refused as a whole
-    is_understood: bool = False  # whether a list was ever taken
     unseen: Unseen = field(default_factory=dict)
 
 
@@ -33,15 +32,13 @@ class Senders:
     def __contains__(self, name: str) -> bool:
         return name in self._senders
 
-    @property
-    def names(self) -> Tuple[str, ...]:
-        """Those of whom a list was taken, with a word on those whose silence is no news."""
-        known = ((name, s) for name, s in self._senders.items() if s.is_understood)
-        return tuple(f"{name} (latched)" if s.latches else name for name, s in known)
+    def label(self, name: str) -> str:
+        """Return the name of a sender for people, with a word on one whose silence is no news."""
+        return f"{name} (latched)" if self._senders[name].latches else name
 
     def take(self, t: float, name: str, latches: bool, unseen: Unseen) -> None:
         """Note a list that was taken and came at ``t`` [s]."""
-        self._senders[name] = _Sender(t, latches, "", True, unseen)
+        self._senders[name] = _Sender(t, latches, "", unseen)
 
     def refuse(self, t: float, name: str, sentence: str) -> None:
         """Note a list at ``t`` [s] that was refused as a whole, with the reason."""
