@@ -139,7 +139,7 @@ class ControllerNode:
         self._follow_guard()
         while not self._requests.empty():
             self._requests.get_nowait()(t)
-        self.controller.obstacles, _ = self._port.look(t)
+        self.controller.obstacles, _ = self._port.look(t, self.controller.estimator)
         self.publishers.obstacles(t, self.controller.obstacles)
         pursued = self.controller.itinerary.is_pursuing
         clock_start = self.controller.itinerary.clock_start
