@@ -5,10 +5,13 @@
 """
 
 import dataclasses
+import functools
 
 import pytest
 
+from nmpc_control import obstacle_memory
 from nmpc_control.dji import VELOCITY
+from nmpc_control.obstacle_sighting import MAX_OBSTACLES
 from uav_sim.closed_loop.faults.escape import way_out
 from uav_sim.closed_loop.faults.flight import FAULT_AT, fly
 from uav_sim.closed_loop.faults.judgement import row_of
@@ -32,6 +35,10 @@ def flown(name, situation, prepare=lambda loop: None):
         ("position_silent", "beside"),
         ("pilot_leaves_f", "turn"),
         ("guard_raises", "hover"),
+        ("obstacles_static_silent", "hover"),
+        ("obstacles_static_nan", "hover"),
+        ("obstacles_static_too_many", "hover"),
+        ("obstacle_appears_in_a_flood", "turn"),
     ],
 )
 def test_a_row_ends_as_expected(name, situation):
@@ -71,12 +78,31 @@ def without_rc(loop):
     loop.inbox.add_rc = lambda t, axes: add(t, axes if t < 3.0 else (*axes[:4], f, axes[5]))
 
 
+def with_lists_that_stand_for_good(loop):
+    for memory in loop._memories:
+        memory.hear = functools.partial(memory.hear, latches=True)
+
+
+def with_lists_that_are_refused_unseen(loop):
+    for memory in loop._memories:
+        memory.refuse = lambda *_: None
+    with_lists_that_stand_for_good(loop)
+
+
+def with_entries_that_are_refused_unseen(loop):
+    for memory in loop._memories:
+        memory._unseen = lambda *_: {}
+
+
 @pytest.mark.parametrize(
     ("name", "situation", "off"),
     [
         ("position_silent", "turn", without_ages),
         ("controller_dead", "hover", without_plan_age),
         ("pilot_leaves_f", "hover", without_rc),
+        ("obstacles_static_silent", "hover", with_lists_that_stand_for_good),
+        ("obstacles_static_too_many", "hover", with_lists_that_are_refused_unseen),
+        ("obstacles_static_nan", "hover", with_entries_that_are_refused_unseen),
     ],
 )
 def test_twin_with_the_protection_off_the_row_fails(name, situation, off):
@@ -123,6 +149,22 @@ def test_twin_a_guard_that_is_not_told_of_its_landing_holds_against_it():
     assert flown(name, "hover")["passed"]
     row = flown(name, "hover", deaf_to_answers)
     assert any("against DJI's landing" in words for words in row["failures"])
+
+
+def unworried(loop):
+    for memory in loop._memories:
+        memory.stale = lambda t: ""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("prepare", "collides"), [(lambda loop: None, False), (unworried, True)])
+def test_twin_a_memory_without_room_for_near_ones_holds_back_or_hits(
+    monkeypatch, prepare, collides
+):
+    monkeypatch.setattr(obstacle_memory, "MAX_REMEMBERED", MAX_OBSTACLES)
+    row = flown("obstacle_appears_in_a_flood", "turn", prepare)
+    assert not row["passed"]
+    assert row["collision"] == collides
 
 
 def without_obstacles(loop):

@@ -168,6 +168,31 @@ def services(client):
     return seen
 
 
+def senders(client):
+    """Say something once and for good, and something else without going on."""
+    once = "{header: {frame_id: world}, obstacles: [{id: mast, size: [1], position: {x: 9}}]}"
+    kind = "nmpc_msgs/ObstacleArray"
+    client.run("rostopic", "pub", "-1", "obstacles", kind, once, "__name:=map")
+    client.wait_for(known="1", senders="/map (latched)")
+    said = lambda: client.diagnostics["flight_guard"][0]  # noqa: E731
+    rospy.sleep(4.0)
+    seen = {"latched": said()}
+    client.say(sphere("tree"))
+    client.wait(lambda: "silent" in said(), "silence noticed")
+    seen["silent"] = said()
+    client.say()
+    client.wait_for(known="1")
+    seen["empty"] = said()
+    client.wait(lambda: "silent" in said(), "silence noticed")
+    remove = rospy.ServiceProxy("remove_obstacle", RemoveObstacle)
+    seen["removed"] = remove("obstacle_client", "").message
+    client.wait(lambda: "silent" not in said(), "silence forgiven")
+    client.end_others()
+    remove("map", "")
+    client.wait_for(known="0")
+    return seen
+
+
 def flood(client):
     """Measure the pace of the guard without, and with 10,000 obstacles at 50 Hz."""
     seconds = 4.0
@@ -192,7 +217,7 @@ def pace(stamps):
     return {"rate": rate, "p99": gaps[int(0.99 * len(gaps))], "longest": gaps[-1]}
 
 
-SITUATIONS = {f.__name__: f for f in (bad_lists, other_frames, services, flood)}
+SITUATIONS = {f.__name__: f for f in (bad_lists, other_frames, services, senders, flood)}
 
 if __name__ == "__main__":
     one = Client()

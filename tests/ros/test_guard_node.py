@@ -13,11 +13,22 @@ BRAKE, VELOCITY = 3, 73.0
 @pytest.fixture
 def flight(ros):
     """Simulator, controller and guard; the guard ends only when a test ends it."""
+    return started(ros, "")
+
+
+@pytest.fixture
+def flight_without_terminal(ros):
+    """The same, and whatever controller and guard print fails: nobody reads it any more."""
+    return started(ros, " 2>&1 | true")
+
+
+def started(ros, output):
     ros.launch("uav_sim", "simulator.launch")
     ros.wait_for_node("/uav_sim")
     nodes = ("flight_guard", "nmpc_controller")
     for name in nodes:
-        ros.start("rosrun", "nmpc_control", name, "_vehicle:=dji_hil", "_simulated:=true")
+        command = f"rosrun nmpc_control {name} _vehicle:=dji_hil _simulated:=true"
+        ros.start("bash", "-c", f"exec {command}" if not output else command + output)
     for name in nodes:
         ros.wait_for_node(f"/{name}")
     return ros
@@ -51,8 +62,8 @@ def test_a_dead_controller_leaves_a_held_aircraft_that_still_lands(flight):
     assert "Traceback" not in flight.output()
 
 
-def test_the_pilot_silences_the_stream_and_only_a_new_start_resumes(flight):
-    seen = flight.run_json("guard_client.py", "pilot_takes_over", timeout=120)
+def test_the_pilot_silences_the_stream_and_only_a_new_start_resumes(flight_without_terminal):
+    seen = flight_without_terminal.run_json("guard_client.py", "pilot_takes_over", timeout=120)
     assert seen["task"] == 1, "authority was not given back"
     assert seen["last_setpoint_after"] < 0.0
     assert seen["start"] == [True, "braking to hover"]
@@ -63,6 +74,21 @@ def test_the_pilot_silences_the_stream_and_only_a_new_start_resumes(flight):
     assert abs(seen["arrived_at"] - 5.0) < 0.5
     assert seen["resume_again"] == [False, "nothing waits to be resumed"]
     assert {"pilot", "pilot_gave_back", "asked", "recovered", "goal"} <= set(seen["codes"])
+
+
+def test_nobody_takes_off_who_was_told_of_no_answer():
+    pytest.importorskip("nmpc_msgs", reason="the workspace is not built or not sourced")
+    from nmpc_control.ros.guard_node import Request, _Question
+
+    late = _Question(Request.START)
+    assert late.give_up() and not late.take_up()
+    assert late.answer == (False, "the guard did not answer: nothing is done")
+    in_time = _Question(Request.START)
+    assert in_time.take_up() and not in_time.give_up()
+    for harmless in (Request.HOVER, Request.RELEASE):
+        late = _Question(harmless)
+        assert late.give_up() and late.take_up()
+        assert late.answer == (False, "the guard did not answer: it acts as soon as it runs")
 
 
 def test_thrust_is_not_commanded_through_a_map_of_no_airframe(monkeypatch):

@@ -85,6 +85,14 @@ def check_services(seen):
     ]
 
 
+def test_who_does_not_go_on_is_stale_unless_the_list_is_latched(nodes):
+    seen = nodes.run_json("obstacle_client.py", "senders", timeout=90)["senders"]
+    assert seen["latched"] == "1 known, 0 of them moving"
+    assert "/obstacle_client reported obstacles and is silent for 2." in seen["silent"]
+    assert seen["empty"] == "1 known, 0 of them moving"
+    assert seen["removed"].startswith("forgotten: 0 from /obstacle_client")
+
+
 @pytest.mark.alone
 def test_a_flood_does_not_slow_the_guard_down(nodes):
     seen = nodes.run_json("obstacle_client.py", "flood", timeout=90)["flood"]

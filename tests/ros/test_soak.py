@@ -31,6 +31,6 @@ def test_a_short_soak_measures_everything(tmp_path):
     assert found["modes"]["FLYING"] > 100
     for name in ("jitter_p99_ms", "gap_max_ms", "tick_p50_ms", "tick_p99_ms"):
         assert all(math.isfinite(value) and value > 0.0 for value in found[name].values()), name
-    assert len(found["rows"]) == 9
+    assert len(found["rows"]) == 11
     assert done.returncode == (0 if all(row["passed"] for row in found["rows"]) else 1)
     assert "Traceback" not in done.stderr

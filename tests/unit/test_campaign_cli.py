@@ -86,6 +86,8 @@ def test_progress_and_table_are_shown(flown, capsys):
         ("static_fields", {"arrived": False}, 1),
         ("moving", {"margin_entered": True}, 0),
         ("moving", {"collisions": 1}, 1),
+        ("moving", {"arrived": False}, 1),
+        ("appearing", {"arrived": False}, 1),
         ("moving", {"feasible": None, "collisions": 1}, 1),
         ("head_on", {"late_s": 2.9}, 0),
         ("head_on", {"late_s": 3.1}, 1),
@@ -102,6 +104,16 @@ def test_gates_decide_the_exit_status(flown, suite, change, status):
         assert campaign("--flights", "1", suite=suite) == 0
         flown[1][1]["held"] = False
     assert campaign("--flights", "4", suite=suite) == status
+
+
+@pytest.mark.parametrize("suite", ["static_fields", "appearing", "head_on"])
+def test_blind_flights_must_collide_or_the_obstacles_prove_nothing(flown, suite):
+    for i in range(4):
+        flown[1][i] = {"collisions": 1, "feasible": None, "arrived": False}
+    flown[1][3] = {}
+    assert campaign("--flights", "4", "--avoidance", "off", suite=suite) == 0
+    flown[1][2] = {}
+    assert campaign("--flights", "4", "--avoidance", "off", suite=suite) == 1
 
 
 def test_what_has_no_way_is_listed_and_does_not_count(flown, tmp_path):

@@ -312,6 +312,21 @@ def test_nothing_is_streamed_before_authority_is_given():
     assert "not given within" in output.reason
 
 
+def test_the_first_setpoint_fits_the_attitude_at_which_authority_comes():
+    """A pilot who rolls while the call is under way has levelled out when it is answered."""
+    flight = Flight(aircraft=airborne())
+    flight.run(1.0, **INDOORS)
+    serve, flight.aircraft.serve = flight.aircraft.serve, lambda actions: None
+    flight.aircraft.x[3] = 0.35
+    flight.tick(Request.START, **INDOORS)
+    flight.solver = None  # or it would fly at once
+    for _ in range(50):
+        flight.aircraft.x[3:9] = 0.0
+        assert flight.tick(**INDOORS).axes is None
+    flight.aircraft.serve, flight.aircraft.authority = serve, True
+    assert abs(flight.tick(**INDOORS).applied[1]) < 0.05
+
+
 def test_a_refused_call_is_told():
     flight = Flight(aircraft=airborne())
     flight.run(1.0)

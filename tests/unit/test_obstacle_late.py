@@ -30,12 +30,14 @@ def test_a_sender_whose_clock_is_late_is_stale_from_its_first_list_on(memory, ot
     assert memory.stale(12.5) == "", "the twin that is less late is known"
 
 
-def test_one_that_moves_in_a_frame_that_was_not_known_then_is_stale(memory):
-    memory.hear(12.5, "/tracker", [(TREE, "frame"), (BIRD._replace(stamp=12.4), "frame")])
+def test_one_in_a_frame_that_was_not_known_then_is_stale(memory):
+    memory.hear(12.5, "/tracker", [(BIRD._replace(stamp=12.4), "frame"), (TREE, "frame")])
     assert memory.rejected == {"frame": 2}
     assert memory.stale(12.5) == "what /tracker says of obstacle bird is of no use: frame not known"
     memory.hear(12.6, "/tracker", [(TREE, "frame")])
-    assert memory.stale(12.6) == "", "what stands is only counted"
+    assert memory.stale(12.6) == "what /tracker says of obstacle tree is of no use: frame not known"
+    say(memory, 12.7, TREE)
+    assert memory.stale(12.7) == ""
 
 
 def test_one_that_begins_to_move_with_old_news_is_stale(memory):

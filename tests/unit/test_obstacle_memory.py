@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from nmpc_control.errors import ConfigError
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.obstacle_memory import ObstacleMemory
+from nmpc_control.obstacle_memory import MAX_REMEMBERED, ObstacleMemory
 from nmpc_control.obstacle_params import load_obstacle_parameters
 from nmpc_control.obstacle_sighting import MAX_OBSTACLES, Sighting, fault, moved, to_obstacle
 
@@ -135,18 +135,19 @@ def test_what_moves_grows_with_age_and_what_stands_does_not(memory):
 
 def test_a_silent_sender_of_moving_ones_is_stale_until_it_speaks_or_is_forgotten(memory):
     say(memory, 10.0, BIRD)
-    say(memory, 10.0, TREE, sender="/map")
+    say(memory, 10.0, TREE, sender="/laser")
     assert memory.stale(12.0) == ""
     assert memory.stale(12.5) == "/tracker reported moving obstacles and is silent for 2.5 s"
-    say(memory, 12.5, TREE, sender="/map")
+    say(memory, 12.5, TREE, sender="/laser")
     assert memory.stale(12.5), "that others speak does not help"
     say(memory, 12.6, BIRD._replace(stamp=12.6))
     assert memory.stale(12.6) == ""
     assert memory.stale(20.0)
     assert memory.forget("/tracker") == 1
-    assert memory.stale(20.0) == ""
+    assert memory.stale(14.4) == ""
     assert names(memory, 20.0) == ["tree"]
-    assert memory.stale(900.0) == "", "what stands never ages"
+    assert memory.stale(900.0) == "/laser reported obstacles and is silent for 887.5 s"
+    assert memory.obstacles(900.0)[0].growth_at(900.0) == 0.0, "what stands does not grow"
 
 
 def test_a_live_sender_with_old_news_of_one_obstacle_is_stale(memory):
@@ -189,14 +190,21 @@ def test_one_moving_report_hides_a_known_one_only_for_as_long_as_it_is_kept(memo
     assert (known.stamp, known.position[0]) == (None, 0.0)
 
 
-def test_no_more_than_the_limit_is_known(memory):
-    many = [TREE._replace(id=f"tree {i}") for i in range(MAX_OBSTACLES - 1)]
-    say(memory, 10.0, *many)
+def test_no_more_than_the_limit_is_remembered_and_no_more_than_fits_counts(memory):
+    many = [TREE._replace(id=f"tree {i}") for i in range(MAX_OBSTACLES)]
+    senders = [f"/map{i}" for i in range(MAX_REMEMBERED // MAX_OBSTACLES)]
+    for sender in senders[:-1]:
+        say(memory, 10.0, *many, sender=sender)
+    say(memory, 10.0, *many[1:], sender=senders[-1])
+    assert (memory.stale(10.0), memory.rejected) == ("", {})
     say(memory, 10.0, BIRD, BIRD._replace(id="second"), sender="/laser")
     assert len(memory.obstacles(10.0)) == MAX_OBSTACLES
     assert memory.rejected == {"no room": 1}
-    say(memory, 10.1, *many)
+    assert memory.stale(10.0) == "what /laser says of obstacle second is of no use: no room"
+    say(memory, 10.1, *many, sender=senders[0])
     assert len(memory.obstacles(10.1)) == MAX_OBSTACLES, "those that are known keep their place"
+    assert memory.rejected == {"no room": 1}
+    assert memory.summary(10.1).left_out == MAX_REMEMBERED - MAX_OBSTACLES
 
 
 def test_after_a_jump_of_the_clock_only_what_stands_is_left(memory):
@@ -240,11 +248,16 @@ LISTS = st.tuples(st.sampled_from(["/x", "/y"]), st.floats(0.0, 3.0), st.lists(E
 
 @given(st.lists(LISTS, max_size=8))
 def test_whatever_is_said_only_sound_obstacles_are_known(said):
-    memory, t, late = ObstacleMemory(PARAMS), 10.0, {}
+    memory, t, late, refusals, heard = ObstacleMemory(PARAMS), 10.0, {}, {}, {}
     for sender, pause, entries in said:
         t += pause
+        before = {track.sighting.id for track in memory._tracks.get(sender, {}).values()}
         refused = memory.hear(t, sender, [(s, fault(s)) for s in entries])
         late[sender] = {name for name, kind in refused if kind == "too old"}
+        heard[sender] = t
+        refusals[sender] = {name for name, kind in refused if kind != "from the future"}
+        new = refusals[sender] - before - {*memory._tracks.get(sender, {})}
+        assert memory.stale(t) or not new, "what is heard of first and refused"
         obstacles = memory.obstacles(t)
         assert len({o.id for o in obstacles}) == len(obstacles)
         for o in obstacles:
@@ -258,7 +271,9 @@ def test_whatever_is_said_only_sound_obstacles_are_known(said):
         moving_ids = {o.id.split("@")[0] for o in moving}
         assert memory.stale(t) or not is_old
         assert memory.stale(t) or not set().union(*late.values()) - moving_ids
-        assert is_old or any(late.values()) or not memory.stale(t)
+        is_silent = any(t - then > PARAMS.stale_after for then in heard.values())
+        assert memory.stale(t) or not is_silent
+        assert is_old or is_silent or any(refusals.values()) or not memory.stale(t)
 
 
 ANGLES = st.floats(-math.pi, math.pi)

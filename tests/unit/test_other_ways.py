@@ -2,6 +2,7 @@
 """Ways round that one local solution does not find, and a side that is kept."""
 
 import dataclasses
+import sys
 
 import numpy as np
 import pytest
@@ -163,6 +164,26 @@ def test_a_dead_end_is_left_for_the_side_that_is_open(nmpc):
     least = min(o.distance(states[:, :3]).min() for o in (BALL, wall))
     assert least > MARGIN
     assert states[-1, 0] > BALL.position[0] + 1.0
+
+
+def test_a_long_way_round_is_worked_out_before_it_is_judged(nmpc, monkeypatch):
+    """Around four large spheres the first iterations are still dearer than to wait."""
+    monkeypatch.setattr(sys.modules[__name__], "SPEED", 1.0)
+    places = {
+        "over": (0.0, 2.08),
+        "under": (0.0, -2.08),
+        "left": (2.08, 0.0),
+        "right": (-2.08, 0.0),
+    }
+    four = [
+        Obstacle(n, np.array([4.3, y, 5.0 + z]), np.array([1.91])) for n, (y, z) in places.items()
+    ]
+    states, _ = fly(nmpc, 1, four, 60)
+    assert states[-1, 0] > 4.0
+    assert min(o.distance(states[:, :3]).min() for o in four) > MARGIN
+    monkeypatch.setattr("nmpc_control.other_ways._ROUNDS", 0)
+    waiting, _ = fly(nmpc, 1, four, 60)
+    assert waiting[-1, 0] < 2.5, "the twin hesitates"
 
 
 def posed(nmpc, speed=SPEED, own=0.0):

@@ -16,6 +16,7 @@ def noted(**changes):
     seconds = np.arange(0.0, DURATION, 1.0)
     drawn = np.arange(0.0, DURATION, 0.1)
     good = {
+        "time": np.array([0.0, DURATION]),
         "commands": t,
         "bare": t + 0.003,
         "bare_age": np.full(len(t), 0.005),
@@ -27,6 +28,7 @@ def noted(**changes):
         "markers": np.full(len(drawn), 12),
         "marker_points": np.full(len(drawn), 900),
         "flights": np.array(5),
+        "aborted": np.array(0),
         "modes": np.array([[3, 900], [4, 100]]),
     }
     return {**good, **changes}
@@ -50,6 +52,16 @@ def test_what_the_machine_does_to_any_process_does_not_count():
     late[5000:] += 0.1
     assert failed(commands=late) == ["longest gap above the bare process"]
     assert failed(commands=late, bare=late) == []
+
+
+def test_a_flight_that_ended_early_is_no_flight():
+    """A released guard publishes no command, so that none of them is late."""
+    released = {"commands": np.arange(0.0, 61.0, 0.02), "modes": np.array([[3, 3000], [8, 12000]])}
+    assert failed(**released) == [
+        "longest gap above the bare process",
+        "statuses of no automatic flight",
+    ]
+    assert failed(aborted=np.array(1)) == ["flights that did not arrive"]
 
 
 def test_jitter_counts_in_both_directions():

@@ -272,6 +272,7 @@ class Guard:
         rung = Rung.BRAKE if has_position and has_velocity else Rung.BRAKE_BLIND
         rung = Rung.LANDING if waits else rung
         if not seen.authority:
+            self._brake.begin(self._sent.last(i.t, i.estimate))  # as the aircraft is when it comes
             return Command(rung)
         if self.situation.gps_holds(seen):
             self._brake.begin(hover_input())  # where a brake of our own would have to go on from

@@ -7,7 +7,6 @@ from typing import Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from nmpc_control import constraints
 from nmpc_control.ipopt import IpoptSolver
 from nmpc_control.model import DISTURBANCE
 from nmpc_control.obstacle import Obstacle
@@ -112,8 +111,8 @@ class Nmpc:
         guess, reference = self._guess(t), x_ref[:, POSITION]
         path = reference if guess is None else guess.states[:, POSITION]
         instance = problem.instance(self._slots, [path, reference])
-        if guess is not None and guess.multipliers is not None:
-            guess.multipliers[:, [constraints.PILOT_BOUNDS + i for i in self._slots.renewed]] = 0.0
+        if guess is not None:
+            guess = self._slots.forgotten(guess)
         solution = self.solver.solve(instance, guess)
         self._solved = problem if problem.obstacles else None
         self._last, self._last_t = solution if solution.found else None, t

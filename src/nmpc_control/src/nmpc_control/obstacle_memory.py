@@ -3,20 +3,24 @@
 
 Every sender speaks for its own list only. What it says is judged entry by entry: a bad one is
 counted and leaves the last good knowledge of its obstacle in place, which grows old. One that
-stands still never ages. One that moves grows: at the rate its sender gave, and at least at the
+stands still does not grow. One that moves does: at the rate its sender gave, and at least at the
 default rate once nothing was heard of it for ``age_limit``; after ``stale_after`` it is stale,
 which the guard answers by braking, until something new is heard or the sender is forgotten. So is
-one that is too old, or in a frame that was not known, when it is heard of first: where it is now is
-not known either.
+a sender that is silent or not understood for that long (``obstacle_senders``), and at once one of
+whose entries something is heard first that cannot be used: where it is now is not known either.
 """
 
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Set, Tuple
+
+import numpy as np
 
 from nmpc_control.obstacle import Obstacle
+from nmpc_control.obstacle_crowd import nearest
 from nmpc_control.obstacle_params import ObstacleParameters
+from nmpc_control.obstacle_senders import Senders, Unseen
 from nmpc_control.obstacle_sighting import MAX_OBSTACLES, Sighting, to_obstacle
 
 DUPLICATE, FUTURE, PAST, BACKWARDS, NO_ROOM, UNPLACED = (
@@ -27,6 +31,8 @@ DUPLICATE, FUTURE, PAST, BACKWARDS, NO_ROOM, UNPLACED = (
     "no room",
     "frame",  # not known at the time of the entry
 )
+MAX_REMEMBERED = 4 * MAX_OBSTACLES  # [1] of all senders; the nearest MAX_OBSTACLES count
+_CROWD_PERIOD = 0.5  # [s] between two looks at which those are
 
 
 class Summary(NamedTuple):
@@ -37,6 +43,7 @@ class Summary(NamedTuple):
     oldest: float  # [s] age of the oldest information about a moving one; 0 without any
     senders: Tuple[str, ...]  # of whom something is known
     rejected: Dict[str, int]  # [1] entries by kind
+    left_out: int = 0  # [1] farther than those that count
 
 
 @dataclass
@@ -59,11 +66,11 @@ class ObstacleMemory:
         self.heard = -math.inf  # [s] when the newest message came
         self._known: Dict[str, Obstacle] = {}
         self._tracks: Dict[str, Dict[str, _Track]] = {}  # by sender and id
-        self._heard: Dict[str, float] = {}  # [s] by sender of whom something is known
-        self._unseen: Dict[str, Dict[str, str]] = {}  # why, of what moves, by sender and id
+        self._senders = Senders(params.stale_after)
         self._owner: Dict[str, str] = {}  # sender whose obstacle carries the bare id
         self._obstacles: Tuple[Obstacle, ...] = ()
         self._due = -math.inf  # [s] when the obstacles next change by themselves
+        self._place: Optional[np.ndarray] = None  # (3,) [m] of the aircraft, where there is a crowd
 
     def set_known(self, obstacles: Sequence[Obstacle]) -> None:
         """Replace those that are known without being heard of, as from a scenario.
@@ -77,7 +84,12 @@ class ObstacleMemory:
         self._due = -math.inf
 
     def hear(
-        self, t: float, sender: str, judged: Iterable[Tuple[Sighting, str]]
+        self,
+        t: float,
+        sender: str,
+        judged: Iterable[Tuple[Sighting, str]],
+        latches: bool = False,
+        received: float = math.inf,
     ) -> List[Tuple[str, str]]:
         """Take a sender's new list; return ids of entries that were not believed, and why not.
 
@@ -85,19 +97,20 @@ class ObstacleMemory:
             t: [s] now.
             sender: its name.
             judged: entries in the world frame, each with what ``obstacle_sighting.fault`` found.
+            latches: its list is meant once and for good, so that its silence is no news.
+            received: [s] when the list came, if that was before now.
         """
         before = self._tracks.get(sender, {})
-        room = MAX_OBSTACLES - len(self._known) - sum(map(len, self._tracks.values()))
+        room = MAX_REMEMBERED - len(self._known) - sum(map(len, self._tracks.values()))
         after: Dict[str, _Track] = {}
-        refused: List[Tuple[str, str]] = []
-        unseen: Dict[str, str] = {}
+        refused: List[Tuple[Sighting, str]] = []
         for sighting, found in judged:
             old = before.get(sighting.id)
             if not found and sighting.id in after:
                 found = DUPLICATE
             if not found and sighting.moves:
                 if sighting.stamp > t + self.params.future_tolerance:
-                    refused.append((sighting.id, FUTURE))  # a wrong clock hides no obstacle
+                    refused.append((sighting, FUTURE))  # a wrong clock hides no obstacle
                     sighting = sighting._replace(stamp=t)
                 found = self._out_of_time(t, sighting, old)
             elif not found:
@@ -106,26 +119,69 @@ class ObstacleMemory:
                 room -= 1
                 found = NO_ROOM if room < 0 else ""
             if found:
-                refused.append((sighting.id, found))
-                if found in (PAST, UNPLACED) and sighting.moves:
-                    age = f"{t - sighting.stamp:.1f} s old"
-                    unseen[sighting.id] = age if found == PAST else "of no use: frame not known"
+                refused.append((sighting, found))
             elif old is not None and old.sighting == sighting:
                 after[sighting.id] = old
             else:
                 after[sighting.id] = self._track(sender, sighting)
-        for name, found in refused:
+        taken = set(after)
+        for sighting, found in refused:
             self.rejected[found] += 1
-            if name in before:
-                after.setdefault(name, before[name])
+            if sighting.id in before:
+                after.setdefault(sighting.id, before[sighting.id])
+        unseen = self._unseen(t, refused, taken, after, self._senders.unseen(sender))
         self.heard = t
-        self._replace(t, sender, before, after)
-        moving = {name for name, track in after.items() if track.moves}
-        self._set_unseen(sender, {n: why for n, why in unseen.items() if n not in moving})
-        return refused
+        self._replace(sender, before, after)
+        self._senders.take(min(received, t), sender, latches, unseen)
+        return [(sighting.id, found) for sighting, found in refused]
+
+    def _unseen(
+        self,
+        t: float,
+        refused: Sequence[Tuple[Sighting, str]],
+        taken: Set[str],
+        after: Dict[str, _Track],
+        earlier: Unseen,
+    ) -> Unseen:
+        """Return of what of a list it is not known where it is, or not known any more."""
+        result: Unseen = {}
+        for s, found in refused:
+            track = after.get(s.id)
+            if found == FUTURE:
+                continue
+            if track is not None and found == DUPLICATE:
+                if s.position == track.sighting.position:
+                    continue
+            elif track is not None and (track.moves or (s.id in taken and not s.moves)):
+                continue  # it ages by its stamp, or was only said twice
+            why = f"of no use: {found}"
+            if found == PAST:
+                why = f"{t - s.stamp:.1f} s old"
+            elif found == UNPLACED:
+                why = "of no use: frame not known"
+            stands = track is not None and not s.moves and found != DUPLICATE
+            late = earlier.get(s.id, ("", t + self.params.stale_after))[1]
+            result[s.id] = why, late if stands else -math.inf
+        return result
+
+    def refuse(self, t: float, sender: str, kind: str, sentence: str) -> None:
+        """Take note of a list that was refused as a whole: as if its sender were silent.
+
+        Args:
+            t: [s] now.
+            sender: its name.
+            kind: under which it is counted; empty: it was counted before.
+            sentence: why, with the sender's name.
+        """
+        self.reject(kind, 1 if kind else 0)
+        self._senders.refuse(t, sender, sentence)
+
+    def knows(self, sender: str) -> bool:
+        """Return whether something was heard of a sender that is not forgotten."""
+        return sender in self._senders
 
     def reject(self, kind: str, count: int = 1) -> None:
-        """Count what could not even be read; the knowledge about its sender's obstacles ages."""
+        """Count entries of nobody's list that were not taken."""
         if count:
             self.rejected[kind] += count
 
@@ -133,28 +189,43 @@ class ObstacleMemory:
         """Forget one obstacle of a sender, or all of them; return how many there were."""
         before = self._tracks.get(sender, {})
         after = {n: track for n, track in before.items() if name and n != name}
-        self._replace(self._heard.get(sender, -math.inf), sender, before, after)
-        unseen = self._unseen.get(sender, {})
-        left = {n: why for n, why in unseen.items() if name and n != name}
-        self._set_unseen(sender, left)
-        return len({*before, *unseen} - {*after, *left})
+        self._replace(sender, before, after)
+        unseen = set(self._senders.unseen(sender))
+        if name:
+            self._senders.unseen(sender).pop(name, None)
+        else:
+            self._senders.forget(sender)
+        return len({*before, *unseen} - {*after, *self._senders.unseen(sender)})
 
     def start_anew(self) -> None:
         """Forget what carries a time, as after a jump of the clock; what stands still stays."""
         for sender, before in list(self._tracks.items()):
             after = {name: track for name, track in before.items() if not track.moves}
-            self._replace(-math.inf, sender, before, after)
-        self._unseen.clear()
+            self._replace(sender, before, after)
+        self._senders.start_anew()
         self.heard = self._due = -math.inf
 
-    def obstacles(self, t: float) -> Tuple[Obstacle, ...]:
-        """Return what is known at ``t`` [s]: the same tuple for as long as nothing changes."""
+    @property
+    def is_crowded(self) -> bool:
+        """Whether more may be known than count, so that it matters where the aircraft is."""
+        return len(self._known) + sum(map(len, self._tracks.values())) > MAX_OBSTACLES
+
+    def obstacles(self, t: float, place: Optional[np.ndarray] = None) -> Tuple[Obstacle, ...]:
+        """Return what is known at ``t`` [s]: the same tuple for as long as nothing changes.
+
+        Of a crowd the ``MAX_OBSTACLES`` that are nearest to ``place`` (3,) [m], which is looked at
+        every half second; without a place to the last one.
+        """
+        self._place = self._place if place is None else place
         if t >= self._due:
             current = tuple(self._current(t))
-            if list(map(id, current)) != list(map(id, self._obstacles)):
-                self._obstacles = current
             ages = (self._limit(k) for k in self._moving() if self._limit(k) > t)
             self._due = min(ages, default=math.inf)
+            if len(current) > MAX_OBSTACLES:
+                current = self._nearest(current, t)
+                self._due = min(self._due, t + _CROWD_PERIOD)
+            if list(map(id, current)) != list(map(id, self._obstacles)):
+                self._obstacles = current
         return self._obstacles
 
     def stale(self, t: float) -> str:
@@ -163,26 +234,20 @@ class ObstacleMemory:
             for name, track in tracks.items():
                 if not track.moves or t - track.obstacle.stamp <= self.params.stale_after:
                     continue
-                silence = t - self._heard[sender]
+                silence = self._senders.silence(t, sender)
                 if silence > self.params.stale_after:
                     return f"{sender} reported moving obstacles and is silent for {silence:.1f} s"
                 age = t - track.obstacle.stamp
                 return f"what {sender} says of obstacle {name} is {age:.1f} s old"
-        for sender, unseen in self._unseen.items():
-            name, why = next(iter(unseen.items()))
-            return f"what {sender} says of obstacle {name} is {why}"
-        return ""
-
-    def _set_unseen(self, sender: str, unseen: Dict[str, str]) -> None:
-        self._unseen.pop(sender, None)
-        if unseen:
-            self._unseen[sender] = unseen
+        return self._senders.finding(t)
 
     def summary(self, t: float) -> Summary:
         """Return figures for people at ``t`` [s]."""
         stamps = [track.obstacle.stamp for track in self._moving()]
         known, oldest = len(self.obstacles(t)), t - min(stamps, default=t)
-        return Summary(known, len(stamps), oldest, tuple(self._tracks), dict(self.rejected))
+        left_out = len(tuple(self._current(t))) - known
+        names, rejected = tuple(map(self._senders.label, self._tracks)), dict(self.rejected)
+        return Summary(known, len(stamps), oldest, names, rejected, left_out)
 
     def _out_of_time(self, t: float, s: Sighting, old: Optional[_Track]) -> str:
         """Return what is wrong with the time of a moving entry; news said again is only old."""
@@ -196,17 +261,14 @@ class ObstacleMemory:
         name = sighting.id if owner == sender else f"{sighting.id}@{sender}"
         return _Track(sighting, to_obstacle(sighting, name))
 
-    def _replace(
-        self, t: float, sender: str, before: Dict[str, _Track], after: Dict[str, _Track]
-    ) -> None:
+    def _replace(self, sender: str, before: Dict[str, _Track], after: Dict[str, _Track]) -> None:
         for name in before.keys() - after.keys():
             if self._owner.get(name) == sender:
                 del self._owner[name]
         if after:
-            self._tracks[sender], self._heard[sender] = after, t
+            self._tracks[sender] = after
         else:
             self._tracks.pop(sender, None)
-            self._heard.pop(sender, None)
         self._due = -math.inf
 
     def _moving(self) -> List[_Track]:
@@ -214,6 +276,11 @@ class ObstacleMemory:
 
     def _limit(self, track: _Track) -> float:
         return track.obstacle.stamp + self.params.age_limit
+
+    def _nearest(self, crowd: Tuple[Obstacle, ...], t: float) -> Tuple[Obstacle, ...]:
+        if self._place is None:
+            return crowd[:MAX_OBSTACLES]
+        return tuple(crowd[i] for i in nearest(crowd, MAX_OBSTACLES, self._place, t))
 
     def _current(self, t: float) -> Iterable[Obstacle]:
         heard = {name for tracks in self._tracks.values() for name in tracks}

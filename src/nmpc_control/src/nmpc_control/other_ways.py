@@ -8,7 +8,7 @@ cheaper by more than a little replaces the solution; the little keeps the side f
 
 import math
 from dataclasses import dataclass
-from typing import List, Optional, Protocol, Sequence
+from typing import List, Optional, Protocol, Sequence, Tuple
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from nmpc_control.state import NU, NX, POSITION, VELOCITY
 
 _PAUSE = 3  # ticks from one try to the next while there is a solution
 _AT_ONCE = 3  # sides tried in a tick without one; the others one a tick, for a tick has to end
+_ROUNDS, _WORTH_MORE = 4, 2.0  # of iterations, for what may yet become better than what there is
 _BETTER = 0.95  # of its cost: what is dearer than this is no reason to change
 _SHORT_CUT = 1e6  # [1/m] of entering margins by more than a touch
 _TOUCH_SOON, _SOON, _TOUCH = 0.02, 2.0, 0.1  # [m] of a touch now, and from these [s] ahead on
@@ -60,6 +61,11 @@ class Posed:
         """Return the numbers for the solver, with obstacles near some paths (N + 1, 3) [m]."""
         data = slots.fill(self.obstacles, self.times, paths, self.margin, self.reach, self.between)
         return self._with(self.x_ref, data, self.theta)
+
+    def again(self, slots: Slots, solution: Solution) -> Tuple[Instance, Guess]:
+        """Return the problem as the next tick would pose it, and where it would begin."""
+        path, reference = solution.states[:, POSITION], self.x_ref[:, POSITION]
+        return self.instance(slots, [path, reference]), slots.forgotten(solution.guess)
 
     def short_cut(self, field: ObstacleField, solution: Solution) -> float:
         """Return how much deeper [m] a solution leads into margins than the aircraft is now.
@@ -116,7 +122,12 @@ class OtherWays:
         self._shooting = shooting
 
     def improve(
-        self, solver: Solver, problem: Posed, solution: Solution, slots: Slots, at_once: bool
+        self,
+        solver: Solver,
+        problem: Posed,
+        solution: Solution,
+        slots: Slots,
+        at_once: bool,
     ) -> "Choice":
         """Return the solution with its slots, or a much better one with its own.
 
@@ -139,8 +150,19 @@ class OtherWays:
         now = at_once or short_cut > 0.0 or self._owed
         if not (now or self._ticks % _PAUSE == 0):  # else a try now and then is enough
             return best
-        least = _merit(solution, short_cut)
         reference = problem.eased_reference()
+        rounds = 0 if at_once else _ROUNDS  # a plan waits for those at once
+
+        def worked_out(found: Solution, seats: Slots, most: float) -> Tuple[Solution, float]:
+            merit = _merit(found, problem.short_cut(field, found))
+            for _ in range(rounds):
+                if found.status != "budget" or merit > most:
+                    break
+                found = solver.solve(*problem.again(seats, found))
+                merit = _merit(found, problem.short_cut(field, found))
+            return found, merit
+
+        _, least = worked_out(solution, slots.copy(), math.inf)  # or who came first would lose
         ways = [self._stay(problem)] if short_cut > 0.0 else []
         across = sides(reference[-1] - reference[0])
         for index in self._due(at_once):
@@ -149,9 +171,9 @@ class OtherWays:
             if way is None:
                 continue
             seats = slots.copy()
-            instance = problem.instance(seats, [way, reference])
-            other = solver.solve(instance, self._guess(solver, problem, way))
-            merit = _merit(other, problem.short_cut(field, other))
+            posed = problem.instance(seats, [way, reference])
+            tried = solver.solve(posed, self._guess(solver, problem, way))
+            other, merit = worked_out(tried, seats, _WORTH_MORE * least)
             if other.found and merit < _BETTER * least:
                 least = merit
                 best = Choice(other, seats)

@@ -98,10 +98,7 @@ class Weights:
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds of the inputs (paper, Eq.
-
-    6), which always hold, and bounds that are softened exactly.
-    """
+    """Bounds of the inputs, which always hold (paper, Eq. 6), and bounds softened exactly."""
 
     input_min: np.ndarray = _array(4)  # (4,) [m/s^2, rad, rad, rad/s]
     input_max: np.ndarray = _array(4)  # (4,)
@@ -110,6 +107,10 @@ class Limits:
     fence_min: np.ndarray = _array(3)  # (3,) [m] least x, y and height
     fence_max: np.ndarray = _array(3)  # (3,) [m]
     soft_weight: float = _positive()  # [1/m] of the L1 penalty on what is softened
+
+    def encloses(self, points: np.ndarray) -> bool:
+        """Return whether points (..., 3) [m] are all inside the fence; one that is NaN is not."""
+        return bool(np.all((points >= self.fence_min) & (points <= self.fence_max)))
 
     def within(self, vehicle: Vehicle) -> "Limits":
         """Return the limits that the vehicle can really follow.

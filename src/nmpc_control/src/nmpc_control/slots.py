@@ -6,14 +6,17 @@ of the last solution still belong to it.
 """
 
 import copy
+from dataclasses import replace
 from typing import List, Optional, Sequence
 
 import numpy as np
 
+from nmpc_control import constraints
 from nmpc_control.errors import ProblemError
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_field import FieldOf, ObstacleField
 from nmpc_control.ocp import EMPTY_SLOT, SLOT_SIZE
+from nmpc_control.solution import Guess
 
 _EXPECTED = 0.75  # of the slots are for what is near the expected path
 _LATER = 0.3  # [m/s] a conflict this much later weighs as much as a metre more of clearance
@@ -81,6 +84,14 @@ class Slots:
         data[rows, :, 3] = spheres.vertical
         data[rows, :, 4] = 1.0 / np.hypot(spheres.radius + margin, half)
         return data
+
+    def forgotten(self, guess: Guess) -> Guess:
+        """Return the guess without the multipliers of obstacles that have left their slots."""
+        if guess.multipliers is None or not self.renewed:
+            return guess
+        multipliers = guess.multipliers.copy()
+        multipliers[:, [constraints.PILOT_BOUNDS + slot for slot in self.renewed]] = 0.0
+        return replace(guess, multipliers=multipliers)
 
     def copy(self) -> "Slots":
         """Return the same obstacles in the same seats, to be filled on their own."""

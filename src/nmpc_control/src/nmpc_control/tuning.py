@@ -4,7 +4,8 @@
 They are parameters of the compiled problem (``ocp``), so a change costs one packing of numbers and
 no solver is built. A change is checked by the code that checks the YAML files, and then against the
 guard, which goes on holding plans to what the launch gave it: limits may be narrowed and opened
-again in flight, but not beyond the launch, and the margin stays above the guard's own.
+again in flight, but not beyond the launch, nor so far that nothing is left to fly with, and the
+margin stays above the guard's own.
 """
 
 from dataclasses import fields, replace
@@ -15,6 +16,7 @@ import numpy as np
 from nmpc_control.config import from_dict
 from nmpc_control.errors import NmpcError
 from nmpc_control.params import Avoidance, Limits, Parameters, Weights
+from nmpc_control.state import GRAVITY
 
 SOURCE = "tuning"
 _STATE = ("x", "y", "z", "roll", "pitch", "yaw", "vx", "vy", "vz", "yaw_rate")
@@ -40,6 +42,15 @@ _NUMBERS = (
     ("avoidance", "cushion_gain"),
     ("avoidance", "allowance"),
 )
+_LEAST_FREEDOM = {  # least range of each input: wind and a wrong mass are to be stood against
+    "thrust": (0.85 * GRAVITY, 1.3 * GRAVITY),  # [m/s^2]
+    "roll": (-0.1, 0.1),  # [rad] 6 degrees
+    "pitch": (-0.1, 0.1),
+    "yaw_rate": (-0.1, 0.1),  # [rad/s]
+}
+_LEAST_RATE = {"thrust": 10.0, "roll": 1.0, "pitch": 1.0, "yaw_rate": 1.0}  # of change, per second
+_LEAST_ROOM = 2.0  # [m] between two sides of the fence
+_LEAST_SPEED = 0.2  # [m/s]
 _GROUPS = {"weights": Weights, "limits": Limits, "avoidance": Avoidance}
 
 Values = Mapping[str, float]
@@ -113,6 +124,32 @@ def require_kept_by_guard(limits: Limits, margin: float, held: Limits, least: fl
         )
 
 
+def require_flyable(parameters: Parameters) -> None:
+    """Raise TuningError where what is left does not hold an aircraft up and in its place.
+
+    The guard would not see it in time: a plan that sinks by its own bounds is a plan.
+    """
+    limits, weights = parameters.limits, parameters.weights
+    for name, low, high, rate in zip(_INPUT, limits.input_min, limits.input_max, limits.input_rate):
+        most, least = _LEAST_FREEDOM[name]
+        _require(f"input_min_{name}", low <= most, low, f"{most:.3g} at most")
+        _require(f"input_max_{name}", high >= least, high, f"{least:.3g} at least")
+        slowest = _LEAST_RATE[name]
+        _require(f"input_rate_{name}", rate >= slowest, rate, f"{slowest:g} at least")
+    for name, low, high in zip(_PLACE, limits.fence_min, limits.fence_max):
+        room = f"{_LEAST_ROOM:g} m above fence_min_{name} at least"
+        _require(f"fence_max_{name}", high - low >= _LEAST_ROOM, high, room)
+    for name, weight in zip(_PLACE, weights.Q):
+        _require(f"Q_{name}", weight > 0.0, weight, "more than 0: or nothing holds a place")
+    least_speed = f"{_LEAST_SPEED:g} at least"
+    _require("speed", limits.speed >= _LEAST_SPEED, limits.speed, least_speed)
+
+
+def _require(name: str, holds: bool, value: float, expected: str) -> None:
+    if not holds:
+        raise TuningError(f"{SOURCE}: {name}: got {value:g}, expected {expected}")
+
+
 class Tuning:
     """What is changed, over what the files say; a change that fails leaves all as it was."""
 
@@ -143,6 +180,7 @@ class Tuning:
             parameters = with_values(self.base, changes)
             limits, margin = parameters.limits, parameters.avoidance.safety_distance
             require_kept_by_guard(limits, margin, self._held, self._least)
+            require_flyable(parameters)
             take(parameters)
         except NmpcError as error:
             self.refusal = str(error)

@@ -74,7 +74,7 @@ class Commands:
         target = np.array([p.x, p.y, p.z])
         self._require_frame(message.header)
         limits = self._controller().parameters.limits
-        if not np.all((target >= limits.fence_min) & (target <= limits.fence_max)):  # NaN is not
+        if not limits.encloses(target):
             raise CommandError("the position is not finite or outside the fence")
         position, present_yaw = self._pose(t)
         yaw = _yaw(q)

@@ -27,7 +27,6 @@ import sys
 import time
 import traceback
 from collections import deque
-from dataclasses import replace
 from typing import Callable, Deque, Dict, Optional, Tuple
 
 import numpy as np
@@ -37,13 +36,15 @@ from std_msgs.msg import Empty, String
 
 from nmpc_control.clock_steps import ClockSteps
 from nmpc_control.controller import Controller
-from nmpc_control.errors import ConfigError, NmpcError
+from nmpc_control.errors import NmpcError
 from nmpc_control.guard_params import load_guard_parameters
 from nmpc_control.ladder import BRAKES
 from nmpc_control.mode_inputs import FOLLOWED, PLANNED
 from nmpc_control.obstacle import Obstacle
-from nmpc_control.params import Parameters, load_parameters, load_weights
+from nmpc_control.params import Limits, Parameters, load_weights
 from nmpc_control.ros.commands import Commands
+from nmpc_control.ros.log_thread import logging_in_a_thread
+from nmpc_control.ros.node_parameters import load_node_parameters
 from nmpc_control.ros.obstacle_port import ObstaclePort
 from nmpc_control.ros.publishers import Publishers
 from nmpc_control.ros.resume_service import ResumeService
@@ -72,6 +73,7 @@ class ControllerNode:
         self.scenario: Optional[Scenario] = None
         offered = rospy.get_param("~scenario", "")
         self._offered = load_scenario(offered) if offered else None
+        self._guard_is = (ControllerStatus.MODE_WAITING, ControllerStatus.RUNG_NONE)
         self._inputs: Deque[Tuple[float, Optional[Tuple[float, ...]]]] = deque(maxlen=200)
         self._requests: "queue.Queue[Callable[[float], None]]" = queue.Queue(maxsize=20)
         self._known: Dict[str, Obstacle] = {}  # of scenarios: a new goal does not remove them
@@ -134,9 +136,10 @@ class ControllerNode:
         while self._inputs:
             sent, u = self._inputs.popleft()
             self.controller.record_input(sent, None if u is None else np.array(u))
+        self._follow_guard()
         while not self._requests.empty():
             self._requests.get_nowait()(t)
-        self.controller.obstacles, _ = self._port.look(t)
+        self.controller.obstacles, _ = self._port.look(t, self.controller.estimator)
         self.publishers.obstacles(t, self.controller.obstacles)
         pursued = self.controller.itinerary.is_pursuing
         clock_start = self.controller.itinerary.clock_start
@@ -152,6 +155,14 @@ class ControllerNode:
             self.publishers.trajectory(self.scenario, itinerary.clock_start)
         self.action.report(t, step, itinerary, pursued)
         self.controller.prepare()
+
+    def _follow_guard(self) -> None:
+        """Have the controller know what the guard does, all of it at once and between two steps."""
+        mode, rung = self._guard_is
+        self.controller.engaged = mode in PLANNED
+        self.controller.braking = mode == ControllerStatus.MODE_BRAKING
+        self.controller.held_back = mode in PLANNED and rung in BRAKES
+        self.controller.manual = mode in FOLLOWED
 
     def _accept_goal(self, t: float) -> None:
         goal = self.action.accept()
@@ -182,9 +193,19 @@ class ControllerNode:
         self._show(scenario)
 
     def _take(self, parameters: Parameters) -> None:
-        """Put parameters into force for the next step; raises ProblemError and leaves the old."""
+        """Put parameters into force for the next step; raises NmpcError and leaves the old."""
+        self._require_kept(parameters.limits)
         self.controller.use(parameters)
         self.parameters = parameters
+
+    def _require_kept(self, limits: Limits) -> None:
+        """Raise NmpcError where a new fence would leave the aircraft outside."""
+        estimate = self.controller.estimator.estimate(rospy.Time.now().to_sec())
+        if estimate is None:
+            return
+        place = estimate.vector[POSITION]
+        if self._is_inside_fence(place) and not limits.encloses(place):
+            raise NmpcError("the aircraft would be outside of that fence")
 
     def _show(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -217,8 +238,7 @@ class ControllerNode:
         self.controller.itinerary.go_to(t, x[POSITION], x[YAW], target, float(x[YAW]))
 
     def _is_inside_fence(self, points: np.ndarray) -> bool:
-        limits = self.parameters.limits
-        return bool(np.all((points >= limits.fence_min) & (points <= limits.fence_max)))
+        return self.parameters.limits.encloses(points)
 
     def _require_inside_fence(self, points: np.ndarray) -> None:
         if not self._is_inside_fence(points):
@@ -239,10 +259,7 @@ class ControllerNode:
         listen = subscriptions.add
 
         def on_status(m: ControllerStatus) -> None:
-            self.controller.engaged = m.mode in PLANNED
-            self.controller.braking = m.mode == ControllerStatus.MODE_BRAKING
-            self.controller.held_back = m.mode in PLANNED and m.rung in BRAKES
-            self.controller.manual = m.mode in FOLLOWED
+            self._guard_is = (m.mode, m.rung)
             u = (m.applied.thrust, m.applied.roll, m.applied.pitch, m.applied.yaw_rate)
             known = m.setpoint_sent and np.all(np.isfinite(u))
             self._inputs.append((m.header.stamp.to_sec(), u if known else None))
@@ -264,24 +281,6 @@ class ControllerNode:
         self._commands.subscribe(subscriptions, self._request)
 
 
-def load_node_parameters() -> Parameters:
-    """Return the parameters that the private ROS parameters select; raises ConfigError."""
-    vehicle = rospy.get_param("~vehicle", "")
-    if not vehicle:
-        raise ConfigError("parameter", "~vehicle", vehicle, "the name of a file in config/vehicles")
-    weights = rospy.get_param("~weights", "") or "outdoor"
-    parameters = load_parameters(vehicle, weights, profile=rospy.get_param("~profile", ""))
-    backend = rospy.get_param("~backend", parameters.solver.backend)
-    if backend not in ("compiled", "ipopt"):
-        raise ConfigError("parameter", "~backend", backend, "compiled or ipopt")
-    avoidance = bool(rospy.get_param("~avoidance", parameters.avoidance.enabled))
-    return replace(
-        parameters,
-        solver=replace(parameters.solver, backend=backend),
-        avoidance=replace(parameters.avoidance, enabled=avoidance),
-    )
-
-
 def main() -> None:
     """Entry point of the node."""
     rospy.init_node("nmpc_controller")
@@ -290,4 +289,5 @@ def main() -> None:
     except NmpcError as error:
         rospy.logfatal(str(error))
         sys.exit(2)
-    node.run()
+    with logging_in_a_thread():
+        node.run()

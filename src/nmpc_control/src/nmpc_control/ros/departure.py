@@ -59,11 +59,13 @@ class Departure:
 
     def _give_back(self) -> None:
         time.sleep(BRAKE_FIRST)
-        while self._services.may_hold_authority and not self.is_over:
-            _, sentence = self._services.release_now()
-            rospy.logwarn(f"shutting down: {sentence}")
-            if self._services.may_hold_authority:
-                time.sleep(PAUSE)
-        self._done.set()
+        try:
+            while self._services.may_hold_authority and not self.is_over:
+                _, sentence = self._services.release_now()
+                rospy.logwarn(f"shutting down: {sentence}")
+                if self._services.may_hold_authority:
+                    time.sleep(PAUSE)
+        finally:
+            self._done.set()
         if not self._ended.wait(STANDSTILL):  # simulated time has ended: so would no tick
             rospy.signal_shutdown("flight_guard ends")

@@ -64,7 +64,8 @@ class GuardListener:
         """
         with self._lock:
             if self.avoidance:
-                self._inbox.obstacles, self._inbox.obstacles_stale = self.obstacles.look(t)
+                seen = self.obstacles.look(t, self._inbox.estimator)
+                self._inbox.obstacles, self._inbox.obstacles_stale = seen
             self._inbox.request, self._inbox.leaving = request, leaving
             sources = self.state.sources
             self._inbox.needs_gps = sources.active == GPS

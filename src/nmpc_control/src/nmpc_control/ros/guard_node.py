@@ -44,6 +44,7 @@ from nmpc_control.ros.departure import Departure
 from nmpc_control.ros.dji_services import DjiServices
 from nmpc_control.ros.guard_listener import GuardListener
 from nmpc_control.ros.guard_reports import GuardReports
+from nmpc_control.ros.log_thread import logging_in_a_thread
 from nmpc_control.ros.obstacle_services import ObstacleServices
 from nmpc_control.ros.source_switch import SourceSwitch
 
@@ -52,15 +53,28 @@ CATCH_UP = 0.01  # [s] of wall time that callbacks then get
 CLOCK_STEP = 0.1  # [s] by which the clock may step back without being a jump
 HEAR_AGAIN = 0.1  # [s] of wall time for telemetry after a jump
 ANSWER_TIMEOUT = 2.0  # [s] wall time in which a tick must answer a service call
+NEVER_LATE = (Request.HOVER, Request.RELEASE)  # done even if the caller was told of no answer
 SWITCH_INTERVAL = 5e-4  # [s] for which a thread that reads messages may keep the loop waiting
 NICENESS = -10  # ahead of solver, recorder and desktop, where the system allows it
 
 
 class _Question:
+    """What an operator asks for; taken up by a tick, or given up by who waits, not both."""
+
     def __init__(self, request: Request) -> None:
         self.request = request
         self.answered = threading.Event()
-        self.answer = (False, "the guard did not answer")
+        late = "it acts as soon as it runs" if request in NEVER_LATE else "nothing is done"
+        self.answer = (False, f"the guard did not answer: {late}")
+        self._decided = threading.Lock()
+
+    def take_up(self) -> bool:
+        """Return whether to act on it: nobody takes off who was told that nothing happened."""
+        return self._decided.acquire(blocking=False) or self.request in NEVER_LATE
+
+    def give_up(self) -> bool:
+        """Return whether no tick has taken it up; none will then."""
+        return self._decided.acquire(blocking=False)
 
 
 class GuardNode:
@@ -80,7 +94,8 @@ class GuardNode:
         self._departure = Departure(self._dji)
         self._t = 0.0
         self._world_frame = guard.params.world_frame
-        self._telemetry = ModeInputs()  # of the last tick
+        self._telemetry = ModeInputs()  # of this tick
+        self._has_sent = False
         self._setpoint = rospy.Publisher(
             "dji_sdk/flight_control_setpoint_generic", Joy, queue_size=1, tcp_nodelay=True
         )
@@ -127,10 +142,14 @@ class GuardNode:
             ticked = time.monotonic()
 
     def _give_way(self, error: Exception) -> None:
-        """Brake or release after a tick that failed outside the guard itself."""
+        """Brake or release after a tick that failed outside the guard itself.
+
+        One that had sent its setpoint sends no other, and one that does not know what the pilot
+        does sends none.
+        """
         try:
             output = self.guard.give_way(self._t, self._telemetry, error)
-            if output.axes is not None and not self._must_stop():
+            if output.axes is not None and not self._has_sent and not self._must_stop():
                 self._setpoint.publish(Joy(axes=output.axes))
             self._act(output)
         except Exception:  # noqa: BLE001 (there is nothing left to fall back to but the next tick)
@@ -153,6 +172,7 @@ class GuardNode:
         begun = time.perf_counter()
         question = self._next_question()
         request = question.request if question else None
+        self._telemetry, self._has_sent = ModeInputs(), False  # nothing of this tick yet
         steady = time.monotonic() if self._has_steady else None  # simulated time is steady itself
         inputs = self._listener.take(
             t, steady, last_request or request, leaving=self._departure.is_due
@@ -165,15 +185,18 @@ class GuardNode:
             output = self.guard.give_way(t, inputs.telemetry, error)
         if output.axes is not None and not last_request:
             self._setpoint.publish(Joy(header=Header(stamp=now), axes=output.axes))
+            self._has_sent = True
         duration = time.perf_counter() - begun
         self._act(output)
         if question:
             question.answer = output.answer or (False, output.reason)
             question.answered.set()
             rospy.loginfo(f"{question.request.value}: {question.answer[1]}")
-        obstacle_age = self._listener.obstacles.age(t)
-        last_plan = self._listener.last_plan
-        self._reports.publish(now, inputs, output, last_plan, obstacle_age, duration)
+        try:
+            obstacle_age, last_plan = self._listener.obstacles.age(t), self._listener.last_plan
+            self._reports.publish(now, inputs, output, last_plan, obstacle_age, duration)
+        except Exception:  # noqa: BLE001 (what cannot be told must not end what is flown)
+            rospy.logerr_throttle(1.0, f"report failed: {traceback.format_exc(limit=-3)}")
 
     def _act(self, output: GuardOutput) -> None:
         if Action.RELEASE_AUTHORITY in output.actions:
@@ -193,7 +216,8 @@ class GuardNode:
                 self._questions.put_nowait(question)
             except queue.Full:
                 return TriggerResponse(False, "too many requests at once")
-            question.answered.wait(ANSWER_TIMEOUT)
+            if not question.answered.wait(ANSWER_TIMEOUT) and not question.give_up():
+                question.answered.wait(ANSWER_TIMEOUT)  # a tick is at it
             return TriggerResponse(*question.answer)
 
         return handle
@@ -204,7 +228,7 @@ class GuardNode:
         except queue.Empty:
             return None
         if not self._departure.is_due:
-            return question
+            return question if question.take_up() else None
         question.answer = (False, "the guard is ending")
         question.answered.set()
         return None
@@ -222,7 +246,8 @@ def main() -> None:
         node = GuardNode(guard, bool(rospy.get_param("~avoidance", True)))
         gc.collect()
         gc.freeze()  # or now and then a tick would wait until all modules were looked through again
-        node.run()
+        with logging_in_a_thread():
+            node.run()
     except NmpcError as error:
         rospy.logfatal(str(error))
         sys.exit(2)
@@ -251,7 +276,7 @@ def _ask_for_priority() -> None:
     try:
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
     except PermissionError:
-        rospy.loginfo("no right to a higher priority: give it by limits.conf, nice")
+        rospy.loginfo("no right to a higher priority: doc/first_flight.md, step 0")
 
 
 def _vehicle_name() -> str:

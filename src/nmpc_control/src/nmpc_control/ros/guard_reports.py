@@ -168,6 +168,7 @@ class GuardReports:
         status.add("jitter p99 [ms]", f"{1e3 * loop.jitter:.1f}")
         status.add("periods late [%]", f"{100.0 * loop.late:.1f}")
         status.add("load per core", f"{load:.2f}")
+        status.add("nice", os.getpriority(os.PRIO_PROCESS, 0))
         return status
 
     def _diagnose_battery(self, status: Wrapper) -> Wrapper:

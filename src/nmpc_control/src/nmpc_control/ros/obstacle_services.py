@@ -99,8 +99,9 @@ class ObstacleServices:
         if sender == rospy.get_name():
             return self._take_back("")
         self._forgotten.publish(sender)
+        is_known = self._port.knows(sender)
         count = self._port.forget(sender)
-        if not count:
+        if not is_known:
             return False, f"nothing is known from {sender}"
         return True, f"forgotten: {count} from {sender}; its next message makes its own known again"
 

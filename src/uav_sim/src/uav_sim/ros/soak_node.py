@@ -6,10 +6,11 @@ nmpc/markers. ROS Services called: start, land. ROS Action: fly_trajectory.
 ROS Parameters: ~minutes, ~scenario, ~nodes (names whose memory is looked at), ~file (what is
 written, numpy's npz), ~seconds_per_sample of the memory.
 
-What is written: commands, bare [s] receipts on a steady clock while plans are flown or braked on;
+What is written: time (2,) [s] of begin and end on a steady clock; commands, bare [s] receipts;
 whole [s] newest telemetry to plan and tick of the guard that flew it, without the wait for that
 tick; flown [s] the same with it; bare_age [s] of the bare process; memory_t [s],
-memory_<node> [MB]; markers_t [s], markers [1], marker_points [1]; modes (statuses of each).
+memory_<node> [MB]; markers_t [s], markers [1], marker_points [1]; modes (statuses of each);
+flights, aborted: goals that ended, and how many of them without arrival.
 """
 
 import sys
@@ -22,6 +23,7 @@ from xmlrpc.client import ServerProxy
 import actionlib
 import numpy as np
 import rospy
+from actionlib_msgs.msg import GoalStatus
 from sensor_msgs.msg import Joy
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
@@ -111,22 +113,27 @@ def main() -> None:
     if not client.wait_for_server(rospy.Duration(PATIENCE)):
         sys.exit("soak: no action fly_trajectory")
     observer.begin()
-    end = time.monotonic() + 60.0 * minutes
+    begin = time.monotonic()
+    end = begin + 60.0 * minutes
     names = str(rospy.get_param("~nodes")).split()
     period = float(rospy.get_param("~seconds_per_sample"))
     arguments = (observer, _processes(names), period, end)
     threading.Thread(target=_watch_memory, args=arguments, daemon=True).start()
-    flights = 0
+    flights = aborted = 0
     while time.monotonic() < end and not rospy.is_shutdown():
         client.send_goal(FlyTrajectoryGoal(scenario=scenario))
         while time.monotonic() < end and not client.wait_for_result(rospy.Duration(0.5)):
             pass
-        flights += 1
+        if time.monotonic() < end:
+            flights += 1
+            aborted += client.get_state() != GoalStatus.SUCCEEDED
     observer.end()
     series = {name: np.array(values) for name, values in observer.series.items()}
     np.savez(
         Path(str(rospy.get_param("~file"))),
+        time=np.array([begin, time.monotonic()]),
         flights=flights,
+        aborted=aborted,
         modes=np.array(sorted(observer.modes.items())),
         **series,
     )

@@ -12,6 +12,8 @@ _ONLY_IN_LEDGER = ("solve_times_us",)
 _LATE = 3.0  # [s] behind the free flight in suite head_on
 _OUTDOOR_CLEARANCE = 0.25  # [m] hull to surface
 _ARRIVED, _OUTDOOR, _INFEASIBLE = 0.98, 0.99, 0.05  # shares of the flights
+_IN_THE_WAY = ("static_fields", "appearing", "head_on")  # suites in which who is blind
+_BLIND = 0.7  # or a greater share collides
 
 
 def summary(settings: Settings, rows: List[Row]) -> Dict[str, Any]:
@@ -56,19 +58,18 @@ def summary(settings: Settings, rows: List[Row]) -> Dict[str, Any]:
 def gates(settings: Settings, rows: List[Row], figures: Dict[str, Any]) -> List[Dict[str, Any]]:
     """Return name, value, bound and verdict of everything the campaign must pass."""
     flights, suite = figures["flights"], settings.suite
-    open_count = flights - figures["infeasible"] - figures["errors"]
-    result = [
-        _at_most("errors", figures["errors"], 0),
-        _at_most("collisions_feasible", figures["collisions_feasible"], 0),
-    ]
+    errors = _at_most("errors", figures["errors"], 0)
+    if not settings.avoidance:
+        blind = _BLIND if suite in _IN_THE_WAY else 0.0
+        return [errors, _at_least("collisions", figures["collisions"], blind * flights)]
+    result = [errors, _at_most("collisions_feasible", figures["collisions_feasible"], 0)]
     if suite == "no_way":
         return [*result, _at_least("held", figures["held"], flights)]
     result.append(_at_most("infeasible", figures["infeasible"], _INFEASIBLE * flights))
+    open_count = flights - figures["infeasible"] - figures["errors"]
+    result.append(_at_least("arrived_feasible", figures["arrived_feasible"], _ARRIVED * open_count))
     if suite == "static_fields" and settings.disturbance == "none":
         result.append(_at_most("margin_entered", figures["margin_entered"], 0))
-        result.append(
-            _at_least("arrived_feasible", figures["arrived_feasible"], _ARRIVED * open_count)
-        )
     if suite == "static_fields" and settings.disturbance == "outdoor":
         clear = sum((row.get("clearance_m") or 0.0) >= _OUTDOOR_CLEARANCE for row in rows)
         result.append(_at_least("clearance_0.25_m", clear, _OUTDOOR * flights))

@@ -12,11 +12,14 @@ from typing import Any, List, Optional, Tuple
 from nmpc_control.clock_steps import STEP, ClockSteps
 from nmpc_control.controller import Controller, Step
 from nmpc_control.dji import Axes, RcMode, rc_mode
+from nmpc_control.estimator import Estimator
 from nmpc_control.guard_data import Action, GuardInputs, GuardOutput
 from nmpc_control.guard_inbox import GuardInbox
+from nmpc_control.obstacle import Obstacle
 from nmpc_control.obstacle_memory import ObstacleMemory
 from nmpc_control.obstacle_params import load_obstacle_parameters
 from nmpc_control.obstacle_sighting import MAX_OBSTACLES, Sighting, fault
+from nmpc_control.state import POSITION
 from uav_sim.body import BodyState
 from uav_sim.closed_loop.faults.service_calls import ServiceCalls
 from uav_sim.closed_loop.faults.trouble import Trouble
@@ -26,7 +29,7 @@ from uav_sim.telemetry import Packet
 from uav_sim.vicon import ViconPose
 
 HEAR_AGAIN = 0.1  # [s] for telemetry after a jump of the clock, as in the guard's node
-SENDER = "simulator"
+SENDER, STRANGER = "simulator", "stranger"
 
 
 class FaultyLoop(ClosedLoop):
@@ -92,17 +95,16 @@ class FaultyLoop(ClosedLoop):
         super().receive(topic, min(t + self.now - self.t, self.now), value)
 
     def look(self) -> None:
-        """Let both memories hear the list of obstacles."""
+        """Let both memories hear the lists of obstacles, those of a crowd first."""
         now = self.now
+        for trouble in self.troubles:
+            self._hear(now, STRANGER, trouble.crowd(now))
         listed: Optional[List[Sighting]] = [
             _sighting(state, now) for state in self.aircraft.sensed_obstacles
         ]
         for trouble in self.troubles:
             listed = None if listed is None else trouble.sight(listed)
-        if listed is not None and len(listed) <= MAX_OBSTACLES:
-            judged = [(s, fault(s)) for s in listed]
-            for memory in self._memories:
-                memory.hear(now, SENDER, judged)
+        self._hear(now, SENDER, listed)
 
     def solve(self) -> None:
         """Let the controller do one step; one that raises is reported by its node, no more."""
@@ -112,7 +114,7 @@ class FaultyLoop(ClosedLoop):
             )
             self.sources[0].forget(self.controller.estimator)
             self._memories[0].start_anew()
-        self.controller.obstacles = self._memories[0].obstacles(self.now)
+        self.controller.obstacles = self._known(0, self.controller.estimator)
 
         def think() -> Optional[Step]:
             return self.controller.step(self.now)
@@ -141,9 +143,8 @@ class FaultyLoop(ClosedLoop):
             self.sources[1].forget(self.inbox.estimator)
             self._memories[1].start_anew()
             return
-        memory = self._memories[1]
-        self.inbox.obstacles = memory.obstacles(self.now)
-        self.inbox.obstacles_stale = memory.stale(self.now)
+        self.inbox.obstacles = self._known(1, self.inbox.estimator)
+        self.inbox.obstacles_stale = self._memories[1].stale(self.now)
         super().tick()
 
     def judge(self, inputs: GuardInputs) -> GuardOutput:
@@ -171,6 +172,18 @@ class FaultyLoop(ClosedLoop):
         for action in output.actions:
             if action in told:
                 self.tell(action, output)
+
+    def _hear(self, now: float, sender: str, listed: Optional[List[Sighting]]) -> None:
+        for memory in self._memories if listed is not None else ():
+            if len(listed) <= MAX_OBSTACLES:
+                memory.hear(now, sender, [(s, fault(s)) for s in listed])
+            else:
+                memory.refuse(now, sender, "too many", f"{sender} sends {len(listed)} obstacles")
+
+    def _known(self, which: int, aircraft: Estimator) -> Tuple[Obstacle, ...]:
+        estimate = aircraft.estimate(self.now)
+        place = None if estimate is None else estimate.vector[POSITION]
+        return self._memories[which].obstacles(self.now, place)
 
     def _try(self, action: Action) -> bool:
         refused = any(trouble.refuses(action) for trouble in self.troubles)

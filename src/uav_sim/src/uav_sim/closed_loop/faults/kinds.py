@@ -25,6 +25,7 @@ TROUBLES: Dict[str, Type[Trouble]] = {
     "obstacles_nan": world_troubles.ObstaclesNan,
     "obstacles_old": world_troubles.ObstaclesOld,
     "obstacles_flood": world_troubles.ObstaclesFlood,
+    "obstacles_stand": world_troubles.ObstaclesStand,
     "obstacle_appears": world_troubles.ObstacleAppears,
     "guard_stops": guard_troubles.GuardStops,
     "guard_raises": guard_troubles.GuardRaises,

@@ -46,6 +46,10 @@ class Trouble:
         """Return what becomes of a list of obstacles; None: it does not come."""
         return sightings
 
+    def crowd(self, t: float) -> Optional[List[Sighting]]:
+        """Return what another sender says of obstacles at ``t`` [s]; None: there is none."""
+        return None
+
     def solve(self, t: float, solve: Solve) -> Optional[Step]:
         """Return what comes of a control step at ``t`` [s]; may raise."""
         return solve()

@@ -5,7 +5,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Dict, List, Optional, Sequence
 
-from nmpc_control.obstacle_sighting import Sighting
+from nmpc_control.obstacle_sighting import MAX_OBSTACLES, Sighting
 from uav_sim.closed_loop.faults.trouble import Trouble
 from uav_sim.faults.topics import TOPICS
 from uav_sim.motion import STILL, Vector
@@ -93,19 +93,36 @@ class ObstaclesOld(Trouble):
 
 
 @dataclass
-class ObstaclesFlood(Trouble):
-    """The list is full of things far away that move."""
+class ObstaclesStand(Trouble):
+    """Of obstacles only those are heard of that stand still."""
 
-    count: int = field(metadata={"min": 1, "max": 1000})  # [1]
+    def sight(self, sightings: List[Sighting]) -> Optional[List[Sighting]]:
+        """Leave those out that move."""
+        return [s for s in sightings if not s.moves]
+
+
+@dataclass
+class ObstaclesFlood(Trouble):
+    """Lists are full of things far away that move, also of another sender that is heard first."""
+
+    count: int = field(metadata={"min": 0, "max": 1000})  # [1] in the list that there is
+    others: int = field(default=0, metadata={"min": 0, "max": MAX_OBSTACLES})  # [1] of the other
 
     def sight(self, sightings: List[Sighting]) -> Optional[List[Sighting]]:
         """Add to the list, in front of what is there."""
         stamp = max((s.stamp for s in sightings), default=0.0)
-        many = [
-            Sighting(f"far{i}", "sphere", (0.5,), (60.0 + i, 60.0, 12.0), (0.1, 0.0, 0.0))
-            for i in range(self.count)
-        ]
-        return [*sightings, *(s._replace(stamp=stamp) for s in many)]
+        return [*_far(self.count, 60.0, stamp), *sightings]
+
+    def crowd(self, t: float) -> Optional[List[Sighting]]:
+        """Return the list of the other sender."""
+        return _far(self.others, 80.0, t) if self.others else None
+
+
+def _far(count: int, north: float, stamp: float) -> List[Sighting]:
+    return [
+        Sighting(f"far{i}", "sphere", (0.5,), (60.0 + i, north, 12.0), (0.1, 0.0, 0.0), stamp=stamp)
+        for i in range(count)
+    ]
 
 
 @dataclass(frozen=True)

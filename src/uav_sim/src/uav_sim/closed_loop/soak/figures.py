@@ -6,7 +6,7 @@ from typing import Any, Dict, List, Mapping, NamedTuple
 
 import numpy as np
 
-from nmpc_control.mode_inputs import Mode
+from nmpc_control.mode_inputs import STREAMING, Mode
 
 PERIOD = 20.0  # [ms] of both streams
 WARM_UP = 60.0  # [s] at most, a fifth of the flight else
@@ -28,15 +28,18 @@ class Row(NamedTuple):
 def figures(noted: Mapping[str, np.ndarray]) -> Dict[str, Any]:
     """Return all figures of a flight [ms, MB, 1]; ``noted`` as ``ros/soak_node.py`` has it."""
     commands, bare = _intervals(noted["commands"]), _intervals(noted["bare"])
+    begin, end = noted["time"]
+    silent = 1e3 * max(noted["commands"][0] - begin, end - noted["commands"][-1])
     age = 1e3 * noted["bare_age"][np.isfinite(noted["bare_age"])]
     whole, flown = 1e3 * noted["whole"], 1e3 * noted["flown"]
     names = [key[7:] for key in noted if key.startswith("memory_") and key != "memory_t"]
     return {
-        "minutes": float(np.ptp(noted["commands"]) / 60.0),
+        "minutes": float((end - begin) / 60.0),
         "flights": int(noted["flights"]),
+        "aborted": int(noted["aborted"]),
         "modes": {Mode(int(mode)).name: int(count) for mode, count in noted["modes"]},
         "jitter_p99_ms": {"commands": _jitter(commands), "bare": _jitter(bare)},
-        "gap_max_ms": {"commands": float(commands.max()), "bare": float(bare.max())},
+        "gap_max_ms": {"commands": float(max(commands.max(), silent)), "bare": float(bare.max())},
         "tick_p50_ms": {"whole": _at(whole, 50), "bare": _at(age, 50), "flown": _at(flown, 50)},
         "tick_p99_ms": {"whole": _at(whole, 99), "bare": _at(age, 99), "flown": _at(flown, 99)},
         "memory_growth_mb": {n: _growth(noted["memory_t"], noted[f"memory_{n}"]) for n in names},
@@ -67,6 +70,8 @@ def rows(found: Mapping[str, Any]) -> List[Row]:
             _above(found["tick_p99_ms"], "whole"),
             TICK_P99_ABOVE,
         ),
+        ("flights that did not arrive", "1", found["aborted"], 0.0),
+        ("statuses of no automatic flight", "1", _not_flown(found["modes"]), 0.0),
         ("markers more than before", "1", found["markers"]["growth"], 0.0),
     ]
     kept += [
@@ -92,6 +97,10 @@ def table(found: Mapping[str, Any]) -> str:
         for row in rows(found)
     ]
     return "\n".join([head, *lines])
+
+
+def _not_flown(modes: Mapping[str, int]) -> int:
+    return sum(count for name, count in modes.items() if Mode[name] not in STREAMING)
 
 
 def _intervals(came: np.ndarray) -> np.ndarray:
