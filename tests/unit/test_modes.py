@@ -28,6 +28,7 @@ WARM = dataclasses.replace(
 )
 ON_GROUND = {"flight_status": FlightStatus.ON_GROUND}
 IN_AIR = {"flight_status": FlightStatus.IN_AIR, "authority": True}
+ITS_OWN = {"flight_status": FlightStatus.LANDING, "authority": True}  # the flight controller's
 SETTLED = {**IN_AIR, "settled_time": P.take_off_settle}
 NO_PLAN = {"plan_usable": False, "plan_finding": "the plan is 0.60 s old"}
 GIVEN_BACK = {"brakes_after_start": True}
@@ -155,7 +156,13 @@ TABLE = [
     (Mode.LANDING, {**IN_AIR, "failure": "refused (ack 1)"}, Mode.BRAKING, "refused (ack 1)"),
     (Mode.LANDING, {**IN_AIR, "time_in_mode": 121.0}, Mode.FAULT, "120 s"),
     (Mode.LANDING, {**IN_AIR, "request": Request.RELEASE}, Mode.RELEASED, "asked"),
-    (Mode.LANDING, {**IN_AIR, "attitude_age": OLD}, Mode.LANDING, ""),
+    (Mode.LANDING, {**IN_AIR, "attitude_age": OLD}, Mode.RELEASED, "attitude is 0.60 s old"),
+    (Mode.LANDING, {**IN_AIR, "tilt_time": 1.0}, Mode.RELEASED, "the tilt has been"),
+    (Mode.LANDING, {**IN_AIR, "blind_time": 9.0}, Mode.RELEASED, "landing does not begin"),
+    (Mode.LANDING, {**IN_AIR, "brake_time_left": -9.0}, Mode.RELEASED, "landing does not begin"),
+    (Mode.LANDING, {**ITS_OWN, "attitude_age": OLD}, Mode.LANDING, ""),
+    (Mode.LANDING, {**ITS_OWN, "tilt_time": 1.0}, Mode.LANDING, ""),
+    (Mode.LANDING, {**ITS_OWN, "blind_time": 9.0}, Mode.LANDING, ""),
     # the pilot
     (Mode.MANUAL, IN_AIR, Mode.WAITING, "new start"),
     (Mode.MANUAL, {**IN_AIR, "request": Request.START}, Mode.WAITING, "new start"),

@@ -5,8 +5,10 @@ from typing import Tuple
 
 from nmpc_control.dji import FlightStatus
 from nmpc_control.mode_conditions import (
+    UNTIL_IT_LANDS,
     Rule,
     airborne,
+    awaits_landing,
     battery_ends_the_flight,
     gps_is_lost,
     on_ground_again,
@@ -185,6 +187,17 @@ COURSE: Tuple[Rule, ...] = (
         "without position for `blind_timeout`, and without GPS",
         lambda i, p: i.blind_time > p.blind_timeout,
         "position is lost for {i.blind_time:.1f} s",
+    ),
+    Rule(
+        "blind",
+        (Mode.LANDING,),
+        Mode.RELEASED,
+        f"the same, or without velocity for as long, {UNTIL_IT_LANDS}",
+        lambda i, p: (
+            awaits_landing(i, p)
+            and (i.blind_time > p.blind_timeout or i.brake_time_left < -p.blind_timeout)
+        ),
+        "position or velocity is lost while the landing does not begin",
     ),
     Rule(
         "recovered",

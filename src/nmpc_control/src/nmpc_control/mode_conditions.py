@@ -57,6 +57,9 @@ def airborne(i: ModeInputs, p: ModeParameters) -> bool:
     return i.in_air and i.settled_time >= p.take_off_settle and i.authority
 
 
+UNTIL_IT_LANDS = "until the flight controller's own landing has begun"
+
+
 def awaits_landing(i: ModeInputs, p: ModeParameters) -> bool:
     """Return whether the flight controller's own landing has not begun, as far as is known.
 

@@ -8,7 +8,14 @@ then what cannot be flown without, then the operator, then the course of the fli
 from typing import Tuple
 
 from nmpc_control.course_rules import COURSE
-from nmpc_control.mode_conditions import Rule, asked, pilot_has_control, start
+from nmpc_control.mode_conditions import (
+    UNTIL_IT_LANDS,
+    Rule,
+    asked,
+    awaits_landing,
+    pilot_has_control,
+    start,
+)
 from nmpc_control.mode_inputs import AUTOMATIC, PLANNED, STARTABLE, STREAMING, Mode, Request
 
 IN_FLIGHT = (Mode.TAKING_OFF, *STREAMING)
@@ -57,6 +64,14 @@ RULES: Tuple[Rule, ...] = (
         "attitude is {i.attitude_age:.2f} s old",
     ),
     Rule(
+        "attitude_stale",
+        (Mode.LANDING,),
+        Mode.RELEASED,
+        f"the same, {UNTIL_IT_LANDS}",
+        lambda i, p: awaits_landing(i, p) and i.attitude_age > p.attitude_timeout,
+        "attitude is {i.attitude_age:.2f} s old",
+    ),
+    Rule(
         "status_stale",
         IN_FLIGHT,
         Mode.RELEASED,
@@ -70,6 +85,14 @@ RULES: Tuple[Rule, ...] = (
         Mode.RELEASED,
         "tilt beyond `watch.tilt` for longer than `tilt_timeout`",
         lambda i, p: i.tilt_time > p.tilt_timeout,
+        "the tilt has been beyond its limit for {i.tilt_time:.1f} s",
+    ),
+    Rule(
+        "tilt",
+        (Mode.LANDING,),
+        Mode.RELEASED,
+        f"the same, {UNTIL_IT_LANDS}",
+        lambda i, p: awaits_landing(i, p) and i.tilt_time > p.tilt_timeout,
         "the tilt has been beyond its limit for {i.tilt_time:.1f} s",
     ),
     Rule(
