@@ -96,7 +96,7 @@ def test_integrators_are_told_apart_by_their_errors():
 
 
 def test_resident_memory_is_what_a_process_holds():
-    program = "import sys; held = bytearray(b'x') * int({}); print(len(held)); sys.stdin.read()"
+    program = "import sys; held = bytearray(b'x') * int({}); print(len(held), flush=True); sys.stdin.read()"
     sizes = []
     for held in (1e6, 41e6):
         process = subprocess.Popen(

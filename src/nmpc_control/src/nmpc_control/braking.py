@@ -56,7 +56,12 @@ class Brake:
         self._thrust_bias = 0.0
 
     def input(
-        self, state: np.ndarray, dt: float, has_position: bool, push: Sequence[float] = (0, 0, 0)
+        self,
+        state: np.ndarray,
+        dt: float,
+        has_position: bool,
+        push: Sequence[float] = (0, 0, 0),
+        velocity: Optional[np.ndarray] = None,
     ) -> np.ndarray:
         """Return the input (4,) that brakes and, once at rest, holds.
 
@@ -65,33 +70,36 @@ class Brake:
             dt: [s] since the last call.
             has_position: whether the position in the state is to be trusted.
             push: (3,) [m/s^2] what the model was found to lack, as wind; it is made up for.
+            velocity: (3,) [m/s] to fly with instead, within the same bounds.
         """
-        if not has_position:
+        wanted = np.zeros(3) if velocity is None else velocity
+        if not has_position or velocity is not None:
             self._rest = self._height = None
         made_up = _shorten(np.array(push[:2], dtype=float), MADE_UP)
-        horizontal = self._horizontal(state, has_position) - made_up
-        vertical = self._vertical(state, dt, has_position) - push[2]
+        holds = has_position and velocity is None
+        horizontal = self._horizontal(state, holds, wanted[:2]) - made_up
+        vertical = self._vertical(state, dt, holds, float(wanted[2])) - push[2]
         self._previous = self._limited(
             self._thrust_vector_input(horizontal, vertical, state[YAW]), dt
         )
         return self._previous.copy()
 
-    def _horizontal(self, state: np.ndarray, has_position: bool) -> np.ndarray:
-        """Return the acceleration (2,) [m/s^2] against velocity, and back to the resting place."""
+    def _horizontal(self, state: np.ndarray, holds: bool, wanted: np.ndarray) -> np.ndarray:
+        """Return the acceleration (2,) [m/s^2] to a velocity, and back to the resting place."""
         p = self.params
-        position, velocity = state[POSITION][:2], state[VELOCITY][:2]
-        if has_position and self._rest is None and math.hypot(*velocity) <= p.rest_speed:
+        position, velocity = state[POSITION][:2], state[VELOCITY][:2] - wanted
+        if holds and self._rest is None and math.hypot(*velocity) <= p.rest_speed:
             self._rest = position.copy()
         offset = np.zeros(2) if self._rest is None else self._rest - position
         return _shorten(p.position_gain * offset - p.velocity_gain * velocity, p.deceleration)
 
-    def _vertical(self, state: np.ndarray, dt: float, has_position: bool) -> float:
+    def _vertical(self, state: np.ndarray, dt: float, holds: bool, climb: float) -> float:
         """Return the acceleration [m/s^2] that holds the height, learning what hover takes."""
         p = self.params
         height, velocity = float(state[POSITION][2]), float(state[VELOCITY][2])
-        if has_position and self._height is None:
+        if holds and self._height is None:
             self._height = height
-        wanted = 0.0 if self._height is None else p.height_gain * (self._height - height)
+        wanted = climb if self._height is None else p.height_gain * (self._height - height)
         error = _clamp(wanted, p.vertical_speed) - velocity
         bound = p.vertical_acceleration
         self._thrust_bias = _clamp(self._thrust_bias + p.thrust_adaptation * error * dt, bound)

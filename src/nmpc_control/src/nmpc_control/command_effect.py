@@ -83,12 +83,15 @@ class CommandEffect:
         self._done = kept * self._done + dt * float(m @ m)
         self._judge(dt, *self._found())
 
-    def follow_hold(self, t: float, dt: float, state: np.ndarray) -> None:
-        """Compare the speed with that of DJI's own brake; arguments as above."""
-        if self._hold_since is None:
+    def follow_hold(self, t: float, dt: float, state: np.ndarray, wanted: np.ndarray) -> None:
+        """Compare the velocity with that which DJI's own control was told to fly, as zero.
+
+        Arguments as above, ``wanted`` (3,) [m/s]; another one is given its time.
+        """
+        speed = float(np.linalg.norm(state[VELOCITY] - wanted))
+        if self._hold_since is None or not np.array_equal(wanted, self._hold_velocity):
             self._interrupt()
-            self._hold_since, self._hold_speed = t, float(np.linalg.norm(state[VELOCITY]))
-        speed = float(np.linalg.norm(state[VELOCITY]))
+            self._hold_since, self._hold_speed, self._hold_velocity = t, speed, wanted
         braked = max(0.0, t - self._hold_since - HOLD_DELAY) * HOLD_DECELERATION
         allowed = max(0.0, self._hold_speed - braked) + HOLD_SLACK
         has_braked = self._hold_speed > HOLD_SPEED and speed < self._hold_speed / 2.0
@@ -98,7 +101,7 @@ class CommandEffect:
         self._expected: Optional[np.ndarray] = None  # (9, 2) [rad] by lag
         self._asked, self._both, self._done = np.zeros(9), np.zeros(9), 0.0  # [rad^2 s]
         self._hold_since: Optional[float] = None
-        self._hold_speed = 0.0
+        self._hold_speed, self._hold_velocity = 0.0, np.zeros(3)
 
     def _commanded(self, t: float, sent: Sent, measured: np.ndarray) -> np.ndarray:
         """Return the attitude (9, 2) [rad] that takes effect at ``t``, by delay."""

@@ -11,6 +11,8 @@ from nmpc_control import modes
 from nmpc_control.braking import Brake
 from nmpc_control.disturbance_estimate import DisturbanceEstimate, learnable
 from nmpc_control.dji import FlightStatus
+from nmpc_control.evasion import Evasion
+from nmpc_control.flight_words import sentence
 from nmpc_control.guard_data import Action, Command, GuardInputs, GuardOutput
 from nmpc_control.guard_params import GuardParameters
 from nmpc_control.ladder import PlanLadder, Rung
@@ -18,7 +20,6 @@ from nmpc_control.link_watch import LinkWatch
 from nmpc_control.mode_conditions import (
     awaits_landing,
     battery_call,
-    battery_sentence,
     gps_is_lost,
     pilot_has_control,
 )
@@ -26,11 +27,10 @@ from nmpc_control.mode_inputs import AUTOMATIC, PLANNED, STREAMING, Mode, ModeIn
 from nmpc_control.obstacle_field import FieldOf, ObstacleField
 from nmpc_control.override import Override
 from nmpc_control.params import Limits, Vehicle
-from nmpc_control.preflight import preflight
 from nmpc_control.sent_inputs import IN_FORCE, SentInputs
 from nmpc_control.setpoints import Setpoints
 from nmpc_control.situation import Situation
-from nmpc_control.state import POSITION, VELOCITY, hover_input
+from nmpc_control.state import VELOCITY, hover_input
 from nmpc_control.verdict import Finding, Verdict
 
 MAX_TICK = 0.1  # [s] a longer pause between ticks counts as this
@@ -58,6 +58,7 @@ class Guard:
         self.override = Override(
             params.stopping, params.brake, vehicle, 1.0 / params.rate, params.plan_check
         )
+        self.evasion = Evasion(params.evasion, vehicle, limits)
         self._field_of = FieldOf()
         self._disturbance = DisturbanceEstimate(
             learnable(params.disturbance, params.vertical_command)
@@ -99,6 +100,7 @@ class Guard:
         answer = modes.answer(self.mode, seen, self.params.modes) if seen.request else None
         actions = (*self._change_mode(i, seen, answer), *self._look_after_battery(i, seen))
         override = self._overridden(i, verdict, obstacles)
+        self._evade(i, seen, obstacles)
         command = self._command(i, seen, rung, dt, override)
         self._axes = command.axes
         if command.axes is not None:
@@ -108,14 +110,14 @@ class Guard:
         return GuardOutput(
             mode=self.mode,
             rung=command.rung,
-            reason=override or self._sentence(seen, verdict),
+            reason=override or self._words(seen, self.override.remark or verdict.sentence),
             code="held_back" if override else self._code,
             axes=command.axes,
             applied=command.applied,
             actions=actions,
             answer=answer,
             clearance=verdict.clearance,
-            target=self._home(i) if Action.RETURN in actions else None,
+            target=self.situation.above_home(i.estimate) if Action.RETURN in actions else None,
         )
 
     def give_way(self, t: float, telemetry: ModeInputs, error: Exception) -> GuardOutput:
@@ -144,6 +146,7 @@ class Guard:
         self.ladder.forget()
         self.link.forget()
         self.override.forget()
+        self.evasion.forget()
 
     def _learn(self, i: GuardInputs) -> None:
         """Take what the model lacks into it, and keep it while DJI's own control brakes."""
@@ -234,17 +237,10 @@ class Guard:
         if self.mode not in PLANNED or not call or call in self._battery_told:
             return ()
         self._battery_told.add(call)
-        if p.battery_action == "return" and self._home(i) is not None:
+        if p.battery_action == "return" and self.situation.above_home(i.estimate) is not None:
             return (Action.RETURN,)
         self.ladder.expect_hold(i.t)
         return (Action.HOLD,)
-
-    def _home(self, i: GuardInputs) -> Optional[Tuple[float, float, float]]:
-        """Return the point [m] above where automatic flight began, at the present height."""
-        if self.situation.home is None or i.estimate is None:
-            return None
-        east, north = self.situation.home[:2]
-        return float(east), float(north), float(i.estimate.vector[POSITION][2])
 
     def _wants_reference(self, now: float, seen: ModeInputs) -> bool:
         """Return whether DJI's local position must be switched on: once, on the ground."""
@@ -274,13 +270,23 @@ class Guard:
         if not seen.authority:
             self._brake.begin(self._sent.last(i.t, i.estimate))  # as the aircraft is when it comes
             return Command(rung)
+        aside = self.evasion.velocity
         if self.situation.gps_holds(seen):
             self._brake.begin(hover_input())  # where a brake of our own would have to go on from
-            return self._setpoints.hold(rung)
+            return self._setpoints.hold(rung, (0.0, 0.0, 0.0) if aside is None else aside)
         state = self._state_in_effect(i)
         push = self._sent.vehicle.disturbance
-        u = self._brake.input(state, dt, has_position and has_velocity, push)
-        return self._setpoints.of_input(rung, u, 0.0)
+        u = self._brake.input(state, dt, has_position and has_velocity, push, aside)
+        return self._setpoints.of_input(rung, u, 0.0 if aside is None else float(aside[2]))
+
+    def _evade(self, i: GuardInputs, seen: ModeInputs, obstacles: ObstacleField) -> None:
+        """Look whether something comes at who brakes without a plan."""
+        p = self.params.modes
+        knows = seen.position_age <= p.position_timeout and seen.velocity_age <= p.velocity_timeout
+        if self.mode is not Mode.BRAKING or not seen.authority or not knows:
+            self.evasion.forget()
+            return
+        self.evasion.look(self._state_in_effect(i), i.t + self.vehicle.delay, obstacles)
 
     def _state_in_effect(self, i: GuardInputs) -> np.ndarray:
         """Return the state (10,) expected when a command sent now takes effect."""
@@ -288,12 +294,6 @@ class Guard:
         known = i.estimate if has_velocity and i.estimate is not None else self.situation.last_good
         return self._sent.state_in_effect(i.t, known)
 
-    def _sentence(self, seen: ModeInputs, verdict: Verdict) -> str:
-        if self.mode is Mode.WAITING:
-            return "; ".join(preflight(seen, self.params.modes)) or self._reason
-        if self.mode not in PLANNED:
-            return self._reason
-        if 2.0 * seen.effectless_time > self.params.modes.effect_brake:
-            return f"the aircraft does not follow the commands: {seen.effectless_time:.1f} s"
-        words = battery_sentence(seen, self.params.modes)
-        return words or self.override.remark or verdict.sentence
+    def _words(self, seen: ModeInputs, flown: str) -> str:
+        evaded = self.evasion.obstacle
+        return sentence(self.mode, seen, self.params.modes, self._reason, evaded, flown)

@@ -8,6 +8,7 @@ from typing import Optional
 from nmpc_control.braking import BrakeParameters
 from nmpc_control.config import config_directory, from_dict, load_profile, load_yaml, overlay
 from nmpc_control.dji import SetpointLimits, Switch
+from nmpc_control.evasion import EvasionParameters
 from nmpc_control.link_watch import LinkParameters
 from nmpc_control.mode_inputs import ModeParameters
 from nmpc_control.params import Disturbance
@@ -38,6 +39,7 @@ class GuardParameters:
     link: LinkParameters = field()
     brake: BrakeParameters = field()
     stopping: StoppingParameters = field()
+    evasion: EvasionParameters = field()
     disturbance: Disturbance = field()
     watch: WatchParameters = field()
 

@@ -30,6 +30,6 @@ class Setpoints:
         axes = dji.attitude_thrust_axes(u, self.vehicle, self.limits, gain)
         return Command(rung, axes, dji.input_from_axes(axes, self.vehicle, gain))
 
-    def hold(self, rung: Rung) -> Command:
-        """Return the command of DJI's own hold, which needs good GPS."""
-        return Command(rung, dji.velocity_axes((0.0, 0.0, 0.0), 0.0, self.limits))
+    def hold(self, rung: Rung, velocity: Sequence[float] = (0.0, 0.0, 0.0)) -> Command:
+        """Return the command of DJI's own hold, or for a velocity (3,) [m/s]; needs good GPS."""
+        return Command(rung, dji.velocity_axes(velocity, 0.0, self.limits))

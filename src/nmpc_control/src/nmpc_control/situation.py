@@ -69,6 +69,13 @@ class Situation:
             self._unheeded.forgive()
             self.home = None if i.estimate is None else i.estimate.vector[POSITION].copy()
 
+    def above_home(self, estimate: Optional[StateEstimate]) -> Optional[Tuple[float, float, float]]:
+        """Return the point [m] above where automatic flight began, at the present height."""
+        if self.home is None or estimate is None:
+            return None
+        east, north = self.home[:2]
+        return float(east), float(north), float(estimate.vector[POSITION][2])
+
     def gps_holds(self, telemetry: ModeInputs) -> bool:
         """Return whether DJI's own velocity control can be trusted to hold."""
         is_fresh = telemetry.gps_age <= self.params.modes.status_timeout
@@ -86,7 +93,7 @@ class Situation:
             if axes[4] == dji.VELOCITY:
                 # a velocity that is not heard any more cannot show that it falls
                 if i.telemetry.velocity_age <= self.params.modes.velocity_timeout:
-                    self.effect.follow_hold(i.t, dt, state)
+                    self.effect.follow_hold(i.t, dt, state, np.array(axes[:3]))
             else:
                 self.effect.follow_attitude(i.t, dt, sent.history, state)
 

@@ -2,9 +2,10 @@
 """Whether a collision could have been avoided by anybody.
 
 The same flight again, bit for bit, up to where the case begins. From there one setpoint is sent on
-and on in place of the guard's: as much tilt as DJI allows to one of eight sides, full or least
-thrust, or DJI's own brake. If each of them collides too, the collision counts as unavoidable.
-What of the case concerns the aircraft goes wrong here too: setpoints that are lost save nobody.
+and on in place of the guard's: as much tilt as DJI allows to one of eight sides, with the thrust
+that carries it or all there is, full or least thrust level, or DJI's own brake. If each of them
+collides too, the collision counts as unavoidable. What of the case concerns the aircraft goes wrong
+here too: setpoints that are lost save nobody.
 """
 
 import math
@@ -35,7 +36,9 @@ def escapes() -> Dict[str, dji.Axes]:
     for k in range(SIDES):
         angle = 2.0 * math.pi * k / SIDES
         roll, pitch = limits.tilt * math.sin(angle), limits.tilt * math.cos(angle)
-        found[f"tilt {math.degrees(angle):.0f}"] = (roll, pitch, carrying, 0.0, flag)
+        side = f"tilt {math.degrees(angle):.0f}"
+        found[side] = (roll, pitch, carrying, 0.0, flag)
+        found[f"{side}, full thrust"] = (roll, pitch, limits.thrust_max, 0.0, flag)
     return found
 
 

@@ -51,8 +51,8 @@ have, calls of `dji_sdk` are repeated as they repeat them, an exception ends no 
   0.3 m/s or less; both on truth, and unless the row says otherwise, and why.
 - What has landed, and what else is expected on the ground, stands there at the end, on truth. No setpoint leaves later than 0.2 s after DJI's
   own landing began.
-- Nothing is hit, on truth, between samples. Where something is, the same flight is flown again eleven times, each time with one setpoint from
-  the fault's beginning on: DJI's own brake, full and least thrust, the greatest tilt to eight sides. Only if each of these collides too is the
+- Nothing is hit, on truth, between samples. Where something is, the same flight is flown again nineteen times, each time with one setpoint from
+  the fault's beginning on: DJI's own brake, full and least thrust, the greatest tilt to eight sides with the thrust that carries it or all there is. Only if each of these collides too is the
   collision unavoidable; rows for which that is expected say so.
 
 `build/faults.json` has `rows` with `fault`, `situation`, `final_mode`, `reason` (of the last change; empty: none), `expected_mode`, `collision`,
@@ -60,7 +60,7 @@ have, calls of `dji_sdk` are repeated as they repeat them, an exception ends no 
 `sinks_m`, `end_speed_m_s`, `on_ground`, `takeover_s` (how long setpoints went on after the pilot was heard), `against_landing_s` (how long setpoints went on into DJI's own landing),
 `collided_with`, `clearance_m`, `unavoidable`, `failures` in words; beside them `collisions`, `unavoidable`, `failed`, `passed`, machine and versions.
 
-What is expected follows from the ladder ([modes](../../nmpc_control/doc/modes.md)), not from what was flown. [Faults](faults.md) has the
+What is expected follows from the ladder ([modes](../../nmpc_control/doc/modes.md)); where a flight contradicted it, the ladder decided. [Faults](faults.md) has the
 simulator's own ones.
 """  # noqa: E501
 
