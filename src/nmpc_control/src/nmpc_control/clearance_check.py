@@ -85,9 +85,8 @@ def _said(plan: Plan) -> str:
 
 def _speed_there(plan: Plan, times: np.ndarray) -> float:
     """Return the greatest speed [m/s] of a plan at some times (k,) [s]."""
-    stages = plan.times
     speeds = np.linalg.norm(plan.states[:, VELOCITY], axis=1)
-    return float(np.interp(times, stages, speeds).max())
+    return float(np.interp(times, plan.times, speeds).max())
 
 
 def _judged(

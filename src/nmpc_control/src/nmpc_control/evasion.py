@@ -63,6 +63,7 @@ class Evasion:
         self.params = params
         self.vehicle = vehicle
         self.limits = limits
+        self._sides = self._velocities(params)
         self.forget()
 
     def forget(self) -> None:
@@ -92,7 +93,7 @@ class Evasion:
         best, kept = None, held.least + (BETTER if is_new else 0.0)
         if not is_new:
             kept = self._look(self.velocity, state, t, obstacles).least + BETTER
-        for velocity in self._sides():
+        for velocity in self._sides:
             end = state[POSITION] + p.horizon * velocity
             if not self.limits.encloses(end):
                 continue
@@ -105,8 +106,9 @@ class Evasion:
         self.obstacle = held.name if self.velocity is not None else ""
         return self.velocity
 
-    def _sides(self) -> List[np.ndarray]:
-        p = self.params
+    @staticmethod
+    def _velocities(p: EvasionParameters) -> List[np.ndarray]:
+        """Return the velocities (3,) [m/s] that are tried."""
         angles = 2.0 * math.pi * np.arange(SIDES) / SIDES
         level = [np.array([p.speed * math.cos(a), p.speed * math.sin(a), 0.0]) for a in angles]
         return [*level, np.array([0.0, 0.0, p.climb]), np.array([0.0, 0.0, -p.climb])]

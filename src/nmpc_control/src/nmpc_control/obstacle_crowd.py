@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Which obstacles count where more are known than can be flown among."""
 
-import math
 from typing import List, Sequence
 
 import numpy as np
 
 from nmpc_control.obstacle import MAX_GROWTH, Obstacle
+from nmpc_control.obstacle_field import bounding_radius
 
 HORIZON = 1.0  # [s] for which one that moves may come straight on
 
@@ -28,7 +28,7 @@ def nearest(obstacles: Sequence[Obstacle], count: int, place: np.ndarray, t: flo
     moves = np.array([o.stamp is not None for o in obstacles])
     velocities = np.array([o.velocity for o in obstacles]) * moves[:, None]
     growths = np.array([o.growth for o in obstacles])
-    reach = np.array([_radius(o) for o in obstacles])
+    reach = np.array([bounding_radius(o) for o in obstacles])
     reach += np.minimum(growths * ages, MAX_GROWTH) + _ways(obstacles, centres)
     has_path = np.array([o.path is not None and len(o.path) > 0 for o in obstacles])
     velocities[has_path] = 0.0
@@ -49,10 +49,3 @@ def _ways(obstacles: Sequence[Obstacle], centres: np.ndarray) -> np.ndarray:
         far = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))
         result[list(which)] = np.maximum.reduceat(far, np.cumsum([0, *counts[:-1]]))
     return result
-
-
-def _radius(o: Obstacle) -> float:
-    size = o.size.tolist()
-    if o.shape == "sphere":
-        return size[0]
-    return math.hypot(size[0], size[1] / 2.0) if o.shape == "cylinder" else math.hypot(*size) / 2.0

@@ -45,7 +45,9 @@ class ObstacleField:
         self._size = np.ones((len(obstacles), 3))
         for row, o in zip(self._size, obstacles):
             row[: len(o.size)] = o.size
-        self.bounding = np.array([_bounding(o) for o in obstacles])  # (n,) [m] sphere around each
+        self.bounding = np.array(
+            [bounding_radius(o) for o in obstacles]
+        )  # (n,) [m] sphere around each
         self.inscribed = np.array([_inscribed(o) for o in obstacles])  # (n,) [m] sphere within each
 
     def __len__(self) -> int:
@@ -182,7 +184,8 @@ def _nearest(
     return nearest, normal
 
 
-def _bounding(o: Obstacle) -> float:
+def bounding_radius(o: Obstacle) -> float:
+    """Return the radius [m] of the sphere around an obstacle."""
     if o.shape == "sphere":
         return float(o.size[0])
     return float(

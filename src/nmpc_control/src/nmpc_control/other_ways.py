@@ -8,6 +8,7 @@ cheaper by more than a little replaces the solution; the little keeps the side f
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import List, Optional, Protocol, Sequence, Tuple
 
 import numpy as np
@@ -81,14 +82,15 @@ class Posed:
         touch = np.interp(when - times[0], [0.0, _SOON], [_TOUCH_SOON, _TOUCH])
         return max(0.0, float((min(self.margin, least[0]) - least - touch).max()))
 
+    @cached_property
+    def eased_reference(self) -> np.ndarray:
+        """The positions (N + 1, 3) [m] of the reference, led away from the aircraft."""
+        return eased(self.x_ref[:, POSITION], self.x0[POSITION], self.times)
+
     def on_reference(self, field: ObstacleField) -> np.ndarray:
         """Return which obstacles (n,) stand on the reference, led away from the aircraft."""
-        reference = self.eased_reference()
+        reference = self.eased_reference
         return conflicts(field.spheres(reference, self.times), self.margin, reference)
-
-    def eased_reference(self) -> np.ndarray:
-        """Return the positions (N + 1, 3) [m] of the reference, led away from the aircraft."""
-        return eased(self.x_ref[:, POSITION], self.x0[POSITION], self.times)
 
     def free(self, path: np.ndarray) -> Instance:
         """Return the problem of following a path (N + 1, 3) [m] without obstacles."""
@@ -150,19 +152,24 @@ class OtherWays:
         now = at_once or short_cut > 0.0 or self._owed
         if not (now or self._ticks % _PAUSE == 0):  # else a try now and then is enough
             return best
-        reference = problem.eased_reference()
+        reference = problem.eased_reference
         rounds = 0 if at_once else _ROUNDS  # a plan waits for those at once
 
-        def worked_out(found: Solution, seats: Slots, most: float) -> Tuple[Solution, float]:
-            merit = _merit(found, problem.short_cut(field, found))
+        def merit_of(found: Solution) -> float:
+            return _merit(found, problem.short_cut(field, found))
+
+        def worked_out(
+            found: Solution, merit: float, seats: Slots, most: float
+        ) -> Tuple[Solution, float]:
             for _ in range(rounds):
                 if found.status != "budget" or merit > most:
                     break
                 found = solver.solve(*problem.again(seats, found))
-                merit = _merit(found, problem.short_cut(field, found))
+                merit = merit_of(found)
             return found, merit
 
-        _, least = worked_out(solution, slots.copy(), math.inf)  # or who came first would lose
+        least = _merit(solution, short_cut)  # worked out, too, or who came first would lose
+        _, least = worked_out(solution, least, slots.copy(), math.inf)
         ways = [self._stay(problem)] if short_cut > 0.0 else []
         across = sides(reference[-1] - reference[0])
         for index in self._due(at_once):
@@ -173,7 +180,7 @@ class OtherWays:
             seats = slots.copy()
             posed = problem.instance(seats, [way, reference])
             tried = solver.solve(posed, self._guess(solver, problem, way))
-            other, merit = worked_out(tried, seats, _WORTH_MORE * least)
+            other, merit = worked_out(tried, merit_of(tried), seats, _WORTH_MORE * least)
             if other.found and merit < _BETTER * least:
                 least = merit
                 best = Choice(other, seats)

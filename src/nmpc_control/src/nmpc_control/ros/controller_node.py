@@ -204,7 +204,7 @@ class ControllerNode:
         if estimate is None:
             return
         place = estimate.vector[POSITION]
-        if self._is_inside_fence(place) and not limits.encloses(place):
+        if self.parameters.limits.encloses(place) and not limits.encloses(place):
             raise NmpcError("the aircraft would be outside of that fence")
 
     def _show(self, scenario: Scenario) -> None:
@@ -237,12 +237,9 @@ class ControllerNode:
         x = estimate.vector
         self.controller.itinerary.go_to(t, x[POSITION], x[YAW], target, float(x[YAW]))
 
-    def _is_inside_fence(self, points: np.ndarray) -> bool:
-        return self.parameters.limits.encloses(points)
-
     def _require_inside_fence(self, points: np.ndarray) -> None:
-        if not self._is_inside_fence(points):
-            limits = self.parameters.limits
+        limits = self.parameters.limits
+        if not limits.encloses(points):
             raise NmpcError(
                 f"the reference leaves the fence from {limits.fence_min} to {limits.fence_max} m"
             )
