@@ -248,3 +248,29 @@ def test_a_source_that_is_none_is_no_parameter():
         load_source_parameters(standby="gps, stars")
     with pytest.raises(ConfigError, match="position_source"):
         load_source_parameters(position_source="external")
+
+
+@pytest.mark.parametrize("name", [GPS, VICON, WORLD_POSITION])
+def test_a_position_that_repeats_itself_while_the_velocity_leads_away_grows_old(name):
+    sources = StateSources(load_source_parameters(position_source=name), Estimator())
+    believed = repeats(sources, name, 0.0, SPEED)
+    assert 0.35 < max(believed) < 0.5  # 0.5 m at 1.14 m/s
+    assert sources.refused()[f"{name} frozen"] > 100
+    assert sources.estimator.age("position", 3.0) > 2.5
+    assert sources.add_position(name, 3.01, place(0.1))  # it goes on: it is one again
+
+
+def test_twin_at_rest_it_is_believed_for_minutes_whatever_the_velocity_is_off_by():
+    sources = StateSources(load_source_parameters(), Estimator())
+    believed = repeats(sources, GPS, 0.0, np.array([0.08, 0.0, 0.0]), seconds=120.0)
+    assert len(believed) == 12000
+
+
+def repeats(sources, name, begin, speed, seconds=3.0):
+    """Return the times [s] at which one and the same position was believed."""
+    believed = []
+    for t in begin + 0.01 * np.arange(1, round(seconds / 0.01) + 1):
+        sources.add_velocity(t, speed)
+        if sources.add_position(name, t, (1.0, 2.0, 3.0)):
+            believed.append(t)
+    return believed

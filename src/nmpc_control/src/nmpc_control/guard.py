@@ -20,7 +20,7 @@ from nmpc_control.link_watch import LinkWatch
 from nmpc_control.mode_conditions import (
     awaits_landing,
     battery_call,
-    gps_is_lost,
+    knows_motion,
     pilot_has_control,
 )
 from nmpc_control.mode_inputs import AUTOMATIC, PLANNED, STREAMING, Mode, ModeInputs, Request
@@ -262,10 +262,8 @@ class Guard:
         waits = self.mode is Mode.LANDING and awaits_landing(seen, self.params.modes)
         if self.mode is not Mode.BRAKING and not waits and not override:
             return Command(_SILENT_RUNGS.get(self.mode, Rung.NONE))
-        has_position = seen.position_age <= self.params.modes.position_timeout
-        has_position = has_position and not gps_is_lost(seen, self.params.modes)
-        has_velocity = seen.velocity_age <= self.params.modes.velocity_timeout
-        rung = Rung.BRAKE if has_position and has_velocity else Rung.BRAKE_BLIND
+        has_motion = knows_motion(seen, self.params.modes)
+        rung = Rung.BRAKE if has_motion else Rung.BRAKE_BLIND
         rung = Rung.LANDING if waits else rung
         if not seen.authority:
             self._brake.begin(self._sent.last(i.t, i.estimate))  # as the aircraft is when it comes
@@ -276,13 +274,12 @@ class Guard:
             return self._setpoints.hold(rung, (0.0, 0.0, 0.0) if aside is None else aside)
         state = self._state_in_effect(i)
         push = self._sent.vehicle.disturbance
-        u = self._brake.input(state, dt, has_position and has_velocity, push, aside)
+        u = self._brake.input(state, dt, has_motion, push, aside)
         return self._setpoints.of_input(rung, u, 0.0 if aside is None else float(aside[2]))
 
     def _evade(self, i: GuardInputs, seen: ModeInputs, obstacles: ObstacleField) -> None:
         """Look whether something comes at who brakes without a plan."""
-        p = self.params.modes
-        knows = seen.position_age <= p.position_timeout and seen.velocity_age <= p.velocity_timeout
+        knows = knows_motion(seen, self.params.modes)
         if self.mode is not Mode.BRAKING or not seen.authority or not knows:
             self.evasion.forget()
             return

@@ -52,6 +52,12 @@ def gps_is_lost(i: ModeInputs, p: ModeParameters) -> bool:
     return i.gps_lost_time > p.gps_timeout
 
 
+def knows_motion(i: ModeInputs, p: ModeParameters) -> bool:
+    """Return whether position and velocity are those of now."""
+    is_fresh = i.position_age <= p.position_timeout and i.velocity_age <= p.velocity_timeout
+    return is_fresh and not gps_is_lost(i, p)
+
+
 def airborne(i: ModeInputs, p: ModeParameters) -> bool:
     """Return whether the take-off has done its work."""
     return i.in_air and i.settled_time >= p.take_off_settle and i.authority

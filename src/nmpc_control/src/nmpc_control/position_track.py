@@ -2,7 +2,8 @@
 """One source of positions: what of it is believed, and the motion that follows from it.
 
 A sample far off the expected place is not believed. Samples that go on to agree with each other are
-the new truth after ``jump_time``: the source's origin has moved, or it was wrong until now.
+the new truth after ``jump_time``: the source's origin has moved, or it was wrong until now. One
+that repeats itself to the last digit while the velocity leads away is not believed either.
 """
 
 import math
@@ -18,6 +19,7 @@ COAST = 0.3  # [s] a velocity of the filter is carried on with its acceleration 
 GAP = 1.0  # [s] after a longer silence nothing is expected any more
 KNOWN = 0.2  # [m/s] standard deviation below which a velocity counts as known
 STILL = np.zeros(3)
+DRIFT_MEMORY = 5.0  # [s] in which a way of the velocity is forgotten: at rest it drifts, too
 
 
 class _Doubt(NamedTuple):
@@ -32,7 +34,7 @@ class PositionTrack:
     def __init__(self, parameters: SourceParameters) -> None:
         """Begin without samples."""
         self.parameters = parameters
-        self.counts: Dict[str, int] = Counter()  # bad, late, outliers; jumps that were accepted
+        self.counts: Dict[str, int] = Counter()  # bad, late, frozen, outliers; jumps accepted
         self._filter: Optional[MotionFilter] = None
         if parameters.velocity == "filter":
             self._filter = MotionFilter(parameters.sigma, parameters.jerk)
@@ -48,6 +50,8 @@ class PositionTrack:
         self._t = -math.inf
         self._motion: Optional[Motion] = None
         self._doubt: Optional[_Doubt] = None
+        self._told = (-math.inf, np.full(3, math.nan))  # [s], (3,) [m] newest sample, believed or not
+        self._led = STILL  # [m] by the velocity since the samples differed last
 
     def age(self, t: float) -> float:
         """Return the age [s] at ``t`` of the newest sample that was believed; inf without."""
@@ -67,6 +71,9 @@ class PositionTrack:
             return False
         if t <= self._t:
             self.counts["late"] += 1
+            return False
+        if self._is_frozen(t, place, velocity):
+            self.counts["frozen"] += 1
             return False
         if self._motion is None or t - self._t > GAP:
             self._begin(t, place, velocity)
@@ -98,6 +105,17 @@ class PositionTrack:
         bent = min(since, COAST)
         motion = self._motion.after(bent)
         return motion._replace(position=motion.position + (since - bent) * motion.velocity)
+
+    def _is_frozen(self, t: float, place: np.ndarray, velocity: Optional[np.ndarray]) -> bool:
+        """Return whether a sample is the old one again though the aircraft has moved on."""
+        (before, last), self._told = self._told, (t, place)
+        if not np.array_equal(place, last):
+            self._led = STILL
+            return False
+        dt = t - before
+        way = STILL if velocity is None else dt * velocity
+        self._led = self._led * math.exp(-dt / DRIFT_MEMORY) + way
+        return bool(np.linalg.norm(self._led) > self.parameters.still)
 
     def _begin(self, t: float, place: np.ndarray, velocity: Optional[np.ndarray]) -> None:
         self._doubt, self._t = None, t

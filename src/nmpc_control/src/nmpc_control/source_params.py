@@ -30,6 +30,7 @@ class SourceParameters:
     jerk: float = _positive()  # [m/s^2.5] density of the acceleration's random walk
     gate: float = _positive()  # [m] off the expected place: not believed
     gate_speed: float = _positive()  # [m/s] by which that widens while nothing is heard
+    still: float = _positive()  # [m] that the velocity leads while samples repeat: not believed
     jump_time: float = _positive()  # [s] of samples that agree with each other: the new truth
 
 
