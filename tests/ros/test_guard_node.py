@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
+import os
 import signal
 import sys
 from pathlib import Path
 
 import pytest
+from simulator_load import pid_of
 
 pytestmark = pytest.mark.ros
 
@@ -60,6 +62,11 @@ def test_a_dead_controller_leaves_a_held_aircraft_that_still_lands(flight):
     assert not granted
     assert "0 of 10 plans verified in a row (the plan is" in words
     assert "Traceback" not in flight.output()
+    threads = [
+        int(task.name) for task in Path(f"/proc/{pid_of(flight, '/flight_guard')}/task").iterdir()
+    ]
+    ranks = {(os.sched_getscheduler(t), os.getpriority(os.PRIO_PROCESS, t)) for t in threads}
+    assert len(ranks) == 1, "a thread of lower rank that holds Python's lock holds up the stream"
 
 
 def test_the_pilot_silences_the_stream_and_only_a_new_start_resumes(flight_without_terminal):
@@ -78,15 +85,16 @@ def test_the_pilot_silences_the_stream_and_only_a_new_start_resumes(flight_witho
 
 def test_nobody_takes_off_who_was_told_of_no_answer():
     pytest.importorskip("nmpc_msgs", reason="the workspace is not built or not sourced")
-    from nmpc_control.ros.guard_node import Request, _Question
+    from nmpc_control.mode_inputs import Request
+    from nmpc_control.ros.question import Question
 
-    late = _Question(Request.START)
+    late = Question(Request.START)
     assert late.give_up() and not late.take_up()
     assert late.answer == (False, "the guard did not answer: nothing is done")
-    in_time = _Question(Request.START)
+    in_time = Question(Request.START)
     assert in_time.take_up() and not in_time.give_up()
     for harmless in (Request.HOVER, Request.RELEASE):
-        late = _Question(harmless)
+        late = Question(harmless)
         assert late.give_up() and late.take_up()
         assert late.answer == (False, "the guard did not answer: it acts as soon as it runs")
 

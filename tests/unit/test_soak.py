@@ -20,6 +20,10 @@ def noted(**changes):
         "commands": t,
         "bare": t + 0.003,
         "bare_age": np.full(len(t), 0.005),
+        "age": np.full(1000, 0.001),
+        "solved": np.full(1000, 0.002),
+        "carried": np.full(1000, 0.001),
+        "guarded": np.full(1000, 0.002),
         "whole": np.full(1000, 0.006),
         "flown": np.full(1000, 0.018),
         "memory_t": seconds,
@@ -35,11 +39,12 @@ def noted(**changes):
 
 
 def failed(**changes):
-    return [row.name for row in rows(figures(noted(**changes))) if not row.passed]
+    flight = noted(**changes)
+    return [row.name for row in rows(figures(flight, flight)) if not row.passed]
 
 
 def test_a_flight_without_fault_keeps_every_bar():
-    found = figures(noted())
+    found = figures(noted(), noted())
     assert failed() == []
     assert found["jitter_p99_ms"]["commands"] == pytest.approx(0.0, abs=1e-6)
     assert found["tick_p50_ms"] == pytest.approx({"whole": 6.0, "bare": 5.0, "flown": 18.0})
@@ -75,6 +80,12 @@ def test_slow_ticks_are_seen():
     rare = np.full(1000, 0.006)
     rare[::50] = 0.030
     assert failed(whole=rare) == ["newest state to Joy, p99 above it"]
+
+
+def test_the_time_of_a_tick_is_that_of_the_flight_without_load():
+    slow = noted(whole=np.full(1000, 0.030))
+    assert all(row.passed for row in rows(figures(slow, noted())))
+    assert not all(row.passed for row in rows(figures(noted(), slow)))
 
 
 def test_memory_counts_after_the_warm_up():

@@ -118,17 +118,19 @@ class Controller:
         vehicle = self._learn(t, x)
         x0 = predict(x, t, t + vehicle.delay, self._inputs, vehicle)
         times = self.nmpc.stage_times(t)
-        references = self.itinerary.reference(times)
+        sampled = self.itinerary.reference(np.append(times, t))
+        references, now = sampled[:-1], sampled[-1]
         plan = self._solve(t, x0, references, steady_input(vehicle, references[0, YAW]))
+        clearance, predicted = self._clearances(x[POSITION], t, plan)
         return Step(
             estimate=estimate,
-            reference=self.itinerary.reference(np.array([t]))[0],
+            reference=now,
             stage_references=references,
             plan=plan,
             goal=self.itinerary.goal,
             reference_time=self.itinerary.reference_time(times[0]),
-            clearance=self._clearance(x[None, POSITION], np.array([t])),
-            predicted_clearance=self._clearance(plan.states[:, POSITION], times),
+            clearance=clearance,
+            predicted_clearance=predicted,
             engaged=engaged,
         )
 
@@ -198,7 +200,12 @@ class Controller:
             return self._inputs[-1][1]
         return hover_input()
 
-    def _clearance(self, positions: np.ndarray, times: np.ndarray) -> float:
-        """Return the least distance [m] from hull to surface for positions (M, 3) at times (M,)."""
-        distances = self._field_of(self.obstacles).distances(positions, times)
-        return float(distances.min(initial=np.inf)) - self.parameters.vehicle.radius
+    def _clearances(self, position: np.ndarray, t: float, plan: Plan) -> Tuple[float, float]:
+        """Return the distance [m] from hull to surface at a position now, and the plan's least."""
+        positions = np.vstack([plan.states[:, POSITION], position])
+        times = np.append(self.nmpc.stage_times(plan.t), t)
+        least = (
+            self._field_of(self.obstacles).distances(positions, times).min(axis=0, initial=np.inf)
+        )
+        radius = self.parameters.vehicle.radius
+        return float(least[-1]) - radius, float(least[:-1].min()) - radius

@@ -85,16 +85,13 @@ class Guard:
         if i.telemetry.battery_age <= self.params.modes.battery_timeout:
             commands = self.mode in STREAMING or self.mode is Mode.LANDING
             self._setpoints.battery.update(i.telemetry.battery, dt, commands)
-
-        def brake_clearance() -> float:
-            state, when = self._state_in_effect(i), i.t + self.vehicle.delay
-            return self.override.brake_clearance(state, when, obstacles)
-
-        def time_to_stop() -> float:
-            return self.override.time_to_stop(self._state_in_effect(i))
-
-        self._take_plan(i, obstacles, brake_clearance)
-        rung, verdict = self.ladder.assess(i.t, obstacles, brake_clearance, time_to_stop)
+        self.look_at_plan(i)
+        rung, verdict = self.ladder.assess(
+            i.t,
+            obstacles,
+            self._brake_clearance(i, obstacles),
+            lambda: self.override.time_to_stop(self._state_in_effect(i)),
+        )
         self.situation.follow(i, dt, self.mode, self._axes, self._sent)
         seen = self.situation.see(i, self.mode, rung, verdict, self.ladder)
         answer = modes.answer(self.mode, seen, self.params.modes) if seen.request else None
@@ -162,9 +159,8 @@ class Guard:
         known = replace(vehicle, disturbance=vehicle.disturbance + estimate.acceleration)
         sent.vehicle = self.ladder.vehicle = self.override.vehicle = known
 
-    def _take_plan(
-        self, i: GuardInputs, obstacles: ObstacleField, brake_clearance: Callable[[], float]
-    ) -> None:
+    def look_at_plan(self, i: GuardInputs) -> None:
+        """Check what has come from the controller: in ``tick``, or before, to make that short."""
         if i.plan_error:
             self.ladder.refuse(i.plan_error)
         if i.plan is None:
@@ -172,17 +168,23 @@ class Guard:
         self.link.take(i.t, i.plan)
         if self.link.finding:
             self.ladder.refuse(self.link.finding, Finding.CLOCK)
-        else:
-            state = None if i.estimate is None else i.estimate.vector
-            self.ladder.take(
-                i.plan,
-                i.goal,
-                t=i.t,
-                state=state,
-                inputs=self._sent.history,
-                obstacles=obstacles,
-                brake_clearance=brake_clearance,
-            )
+            return
+        obstacles = self._field_of(i.obstacles)
+        self.ladder.take(
+            i.plan,
+            i.goal,
+            t=i.t,
+            state=None if i.estimate is None else i.estimate.vector,
+            inputs=self._sent.history,
+            obstacles=obstacles,
+            brake_clearance=self._brake_clearance(i, obstacles),
+        )
+
+    def _brake_clearance(self, i: GuardInputs, obstacles: ObstacleField) -> Callable[[], float]:
+        """Return what tells how near [m] a brake begun now would come to an obstacle."""
+        return lambda: self.override.brake_clearance(
+            self._state_in_effect(i), i.t + self.vehicle.delay, obstacles
+        )
 
     def _overridden(self, i: GuardInputs, verdict: Verdict, obstacles: ObstacleField) -> str:
         """Return why to brake although there is a plan; empty where that is not so."""

@@ -3,6 +3,7 @@
 
 import math
 from collections import Counter
+from dataclasses import replace
 from typing import Dict, Optional, Sequence, Tuple
 
 from nmpc_control import dji
@@ -89,7 +90,7 @@ class GuardInbox:
 
     def inputs(self, t: float, steady: Optional[float] = None) -> GuardInputs:
         """Return what a tick at ``t`` [s] sees; ``steady`` [s] is a clock that nobody sets."""
-        estimate = self.estimator.estimate(t)
+        seen = self.plan_inputs(t, steady)
         rc = self._rc[1]
         ages = {name: self._state_age(name, t, steady) for name in _STATE}
         telemetry = ModeInputs(
@@ -112,20 +113,28 @@ class GuardInbox:
             landing_granted=self.landing_granted,
             request=self.request,
         )
-        (plan, goal), error = self._plan or (None, Goal.HOLD), self._plan_error
-        self._plan, self._plan_error, self.failure, self.request = None, "", "", None
+        self.failure, self.request = "", None
         self._left_f, self.landing_granted = None, False
+        return replace(
+            seen,
+            telemetry=telemetry,
+            height=self._height,
+            obstacles_stale=self.obstacles_stale,
+            yaw_disagreement=self.yaw_disagreement,
+        )
+
+    def plan_inputs(self, t: float, steady: Optional[float] = None) -> GuardInputs:
+        """Return what is needed to look at a plan before the next tick, and empty the plan."""
+        (plan, goal), error = self._plan or (None, Goal.HOLD), self._plan_error
+        self._plan, self._plan_error = None, ""
         return GuardInputs(
             t=t,
-            telemetry=telemetry,
-            estimate=estimate,
-            height=self._height,
+            telemetry=ModeInputs(velocity_age=self._state_age("velocity", t, steady)),
+            estimate=self.estimator.estimate(t),
             plan=plan,
             plan_error=error,
             goal=goal,
             obstacles=self.obstacles,
-            obstacles_stale=self.obstacles_stale,
-            yaw_disagreement=self.yaw_disagreement,
             steady=steady,
         )
 

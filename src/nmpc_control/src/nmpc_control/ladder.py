@@ -185,10 +185,10 @@ class PlanLadder:
     ) -> Tuple[Rung, Verdict]:
         if self.plan is None:
             return Rung.NONE, self._verdict
-        if self._is_new:
-            rung, verdict = Rung.NEW_PLAN, self._verdict
+        rung = Rung.NEW_PLAN if self._is_new else Rung.LAST_PLAN
+        if self._is_new and obstacles is self._seen:
+            verdict = self._verdict
         else:
-            rung = Rung.LAST_PLAN
             unchanged = obstacles is self._seen and isinstance(obstacles, ObstacleField)
             verdict = check_flown(
                 self.flown,

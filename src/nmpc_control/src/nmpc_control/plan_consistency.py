@@ -97,12 +97,11 @@ def as_flown(
     sent = [(plan.t + k * plan.dt, u) for k, u in enumerate(plan.inputs[: first + 1])]
     history = [*inputs, *((max(when, t), u) for when, u in sent)]
     begin = plan.t + plan.delay + first * plan.dt
-    x = predict(state, t, begin, history, vehicle)
-    states[first] = x
+    states[first] = predict(state, t, begin, history, vehicle)
     last = min(plan.horizon, first + math.ceil(OPEN_LOOP / plan.dt))
-    for k in range(first, last):
-        x = step(x, plan.inputs[k], plan.dt, vehicle)
-        states[k + 1] = x
+    x, given = states[first].tolist(), plan.inputs[first:last].tolist()  # plain floats are quicker
+    for k, u in enumerate(given, first + 1):
+        x = states[k] = step(x, u, plan.dt, vehicle)
     ahead = plan.dt * np.arange(1, plan.horizon - last + 1)
     offset = states[last] - plan.states[last]
     states[last + 1 :] += np.exp(-ahead / SETTLING)[:, None] * offset

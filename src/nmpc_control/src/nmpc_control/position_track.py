@@ -50,7 +50,7 @@ class PositionTrack:
         self._t = -math.inf
         self._motion: Optional[Motion] = None
         self._doubt: Optional[_Doubt] = None
-        self._told = (-math.inf, np.full(3, math.nan))  # [s], (3,) [m] newest sample, believed or not
+        self._told = (-math.inf, np.full(3, math.nan))  # [s], [m] newest, believed or not
         self._led = STILL  # [m] by the velocity since the samples differed last
 
     def age(self, t: float) -> float:

@@ -145,4 +145,8 @@ def _move(start: Vector, slope: Vector, t: float) -> Vector:
 
 
 def _mean_slope(k1: Vector, k2: Vector, k3: Vector, k4: Vector) -> Vector:
-    return tuple((a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4))
+    return (
+        (k1[0] + 2.0 * k2[0] + 2.0 * k3[0] + k4[0]) / 6.0,
+        (k1[1] + 2.0 * k2[1] + 2.0 * k3[1] + k4[1]) / 6.0,
+        (k1[2] + 2.0 * k2[2] + 2.0 * k3[2] + k4[2]) / 6.0,
+    )

@@ -93,7 +93,7 @@ class ReferenceClock:
             return 0.0
         now = min(self.time, self._trajectory.duration)
         ago = np.linspace(0.0, min(_LOOK_BACK, now), _SAMPLES)
-        points = self._trajectory.sample(now - ago).position
+        points = self._trajectory.positions(now - ago)
         away = np.linalg.norm(points - position, axis=1)
         nearest = int(np.argmin(away))
         way = float(np.linalg.norm(np.diff(points[: nearest + 1], axis=0), axis=1).sum())

@@ -66,6 +66,10 @@ class Trajectory:
         """Last point (3,) [m]."""
         return self.sample(self.duration).position[0]
 
+    def positions(self, times: np.ndarray) -> np.ndarray:
+        """Return the points (M, 3) [m] of ``sample`` at times (M,) [s], and nothing else."""
+        return self.curve(self.timing(np.clip(times, 0.0, self.duration))[0])
+
     def sample(self, times: Union[float, np.ndarray]) -> TrajectorySample:
         """Return the reference at times (M,) [s]; before 0 and from the duration on it rests."""
         times = np.atleast_1d(np.asarray(times, float))

@@ -59,6 +59,8 @@ from nmpc_control.state import POSITION, YAW
 from nmpc_control.tuning import Tuning
 from nmpc_msgs.msg import ControllerStatus, PositionSource
 
+TELEMETRY_WAIT = 0.02  # [s] of wall time: a plan is made from a state that has just come
+
 
 class ControllerNode:
     """Callbacks store or queue; everything else happens in ``run``, in one thread."""
@@ -120,6 +122,7 @@ class ControllerNode:
                 continue  # seen above, like a computer's own clock, of which rospy does not tell
             except rospy.ROSInterruptException:
                 break
+            self.state.wait_for_attitude(TELEMETRY_WAIT)
 
     def _start_anew(self) -> None:
         """Forget everything that carries a time, as after a jump of the clock."""
@@ -140,16 +143,17 @@ class ControllerNode:
         while not self._requests.empty():
             self._requests.get_nowait()(t)
         self.controller.obstacles, _ = self._port.look(t, self.controller.estimator)
-        self.publishers.obstacles(t, self.controller.obstacles)
         pursued = self.controller.itinerary.is_pursuing
         clock_start = self.controller.itinerary.clock_start
         step = self.controller.step(t)
+        if step is not None:
+            self.publishers.step(now, step, misses, state_stamp, time.perf_counter() - begun)
+        elif self.state.hears:
+            self.publishers.no_plan(now, self.controller.why_not(t), state_stamp)
+        self.publishers.obstacles(t, self.controller.obstacles)
         self.publishers.diagnose(step, misses)
         if step is None:
-            if self.state.hears:
-                self.publishers.no_plan(now, self.controller.why_not(t), state_stamp)
             return
-        self.publishers.step(now, step, misses, state_stamp, time.perf_counter() - begun)
         itinerary = self.controller.itinerary
         if itinerary.clock_start is not None and itinerary.clock_start != clock_start:
             self.publishers.trajectory(self.scenario, itinerary.clock_start)

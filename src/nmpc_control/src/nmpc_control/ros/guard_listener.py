@@ -37,6 +37,7 @@ class GuardListener:
         self.obstacles = ObstaclePort(params.world_frame)
         self._inbox = GuardInbox(params)
         self._lock = threading.Lock()
+        self._plan_came = threading.Event()
         self.state = StatePort(self._inbox.estimator, params.world_frame, self._lock)
         subscriptions = Subscriptions()
         self.state.subscribe(subscriptions)
@@ -71,7 +72,21 @@ class GuardListener:
             self._inbox.needs_gps = sources.active == GPS
             yaw = sources.yaw_disagreement(t)
             self._inbox.yaw_disagreement = math.nan if yaw is None else yaw
+            self._plan_came.clear()
             return self._inbox.inputs(t, steady)
+
+    def wait_for_plan(self, limit: float) -> bool:
+        """Wait until there is a plan that no tick has seen, at most ``limit`` [s] of wall time."""
+        return self._plan_came.wait(limit)
+
+    def take_plan(self, t: float, steady: Optional[float]) -> GuardInputs:
+        """Return what is needed to look at a plan before the next tick; arguments as of ``take``.
+
+        Obstacles are those of the last tick; the next one looks at the plan with its own.
+        """
+        self._plan_came.clear()
+        with self._lock:
+            return self._inbox.plan_inputs(t, steady)
 
     @property
     def authority(self) -> bool:
@@ -134,3 +149,4 @@ class GuardListener:
             self._inbox.add_plan(*plan_from_msg(message, self.params.world_frame))
         except MessageError as error:
             self._inbox.add_plan_error(str(error))
+        self._plan_came.set()

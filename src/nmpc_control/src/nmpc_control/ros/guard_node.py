@@ -21,7 +21,6 @@ import os
 import queue
 import signal
 import sys
-import threading
 import time
 import traceback
 from dataclasses import replace
@@ -46,35 +45,18 @@ from nmpc_control.ros.guard_listener import GuardListener
 from nmpc_control.ros.guard_reports import GuardReports
 from nmpc_control.ros.log_thread import logging_in_a_thread
 from nmpc_control.ros.obstacle_services import ObstacleServices
+from nmpc_control.ros.question import Question
 from nmpc_control.ros.source_switch import SourceSwitch
 
 OVERSLEPT = 0.06  # [s] of wall time between two ticks: this process was not running
 CATCH_UP = 0.01  # [s] of wall time that callbacks then get
 CLOCK_STEP = 0.1  # [s] by which the clock may step back without being a jump
 HEAR_AGAIN = 0.1  # [s] of wall time for telemetry after a jump
+PLAN_CHECK = 0.005  # [s] a look at a plan takes; with less left before a tick, it is part of it
 ANSWER_TIMEOUT = 2.0  # [s] wall time in which a tick must answer a service call
-NEVER_LATE = (Request.HOVER, Request.RELEASE)  # done even if the caller was told of no answer
 SWITCH_INTERVAL = 5e-4  # [s] for which a thread that reads messages may keep the loop waiting
-NICENESS = -10  # ahead of solver, recorder and desktop, where the system allows it
-
-
-class _Question:
-    """What an operator asks for; taken up by a tick, or given up by who waits, not both."""
-
-    def __init__(self, request: Request) -> None:
-        self.request = request
-        self.answered = threading.Event()
-        late = "it acts as soon as it runs" if request in NEVER_LATE else "nothing is done"
-        self.answer = (False, f"the guard did not answer: {late}")
-        self._decided = threading.Lock()
-
-    def take_up(self) -> bool:
-        """Return whether to act on it: nobody takes off who was told that nothing happened."""
-        return self._decided.acquire(blocking=False) or self.request in NEVER_LATE
-
-    def give_up(self) -> bool:
-        """Return whether no tick has taken it up; none will then."""
-        return self._decided.acquire(blocking=False)
+REAL_TIME = 1  # real-time priority, the lowest
+NICENESS = -10  # where the system grants no real time
 
 
 class GuardNode:
@@ -90,12 +72,13 @@ class GuardNode:
         SourceSwitch(self._listener.state, lambda: guard.mode in AUTOMATIC)
         heard = self._listener
         self._dji = DjiServices(heard.set_authority, heard.report_failure, heard.report_landing)
-        self._questions: "queue.Queue[_Question]" = queue.Queue(maxsize=10)
+        self._questions: "queue.Queue[Question]" = queue.Queue(maxsize=10)
         self._departure = Departure(self._dji)
         self._t = 0.0
         self._world_frame = guard.params.world_frame
         self._telemetry = ModeInputs()  # of this tick
         self._has_sent = False
+        self._looked = 0.0  # [s] spent on a plan before the tick; a part of it
         self._setpoint = rospy.Publisher(
             "dji_sdk/flight_control_setpoint_generic", Joy, queue_size=1, tcp_nodelay=True
         )
@@ -130,6 +113,7 @@ class GuardNode:
             if is_last:
                 break
             try:
+                self._look_ahead(rate)
                 rate.sleep()
             except rospy.ROSTimeMovedBackwardsException:
                 rospy.logwarn("the clock jumped backwards")
@@ -140,6 +124,22 @@ class GuardNode:
                     CATCH_UP
                 )  # what came meanwhile waits in the sockets: hear it, then judge
             ticked = time.monotonic()
+
+    def _look_ahead(self, rate: rospy.Rate) -> None:
+        """Check a plan that comes long enough before the next tick, so that the tick is short."""
+        if not self._has_steady:
+            return
+        spare = rate.remaining().to_sec() - PLAN_CHECK
+        if spare <= 0.0 or not self._listener.wait_for_plan(spare):
+            return
+        begun = time.perf_counter()
+        t = max(rospy.Time.now().to_sec(), self._t)
+        try:
+            self.guard.look_at_plan(self._listener.take_plan(t, time.monotonic()))
+        except Exception as error:  # noqa: BLE001 (a plan that cannot be checked is refused)
+            rospy.logerr_throttle(1.0, f"plan check failed: {traceback.format_exc(limit=-3)}")
+            self.guard.ladder.refuse(f"its check failed: {type(error).__name__}: {error}")
+        self._looked = time.perf_counter() - begun
 
     def _give_way(self, error: Exception) -> None:
         """Brake or release after a tick that failed outside the guard itself.
@@ -169,7 +169,7 @@ class GuardNode:
             return
         t = max(now.to_sec(), self._t)  # a small step back: time stands still until it is caught up
         self._t = t
-        begun = time.perf_counter()
+        begun, self._looked = time.perf_counter() - self._looked, 0.0
         question = self._next_question()
         request = question.request if question else None
         self._telemetry, self._has_sent = ModeInputs(), False  # nothing of this tick yet
@@ -211,7 +211,7 @@ class GuardNode:
 
     def _serve(self, request: Request) -> Callable[[TriggerRequest], TriggerResponse]:
         def handle(_: TriggerRequest) -> TriggerResponse:
-            question = _Question(request)
+            question = Question(request)
             try:
                 self._questions.put_nowait(question)
             except queue.Full:
@@ -222,7 +222,7 @@ class GuardNode:
 
         return handle
 
-    def _next_question(self) -> Optional[_Question]:
+    def _next_question(self) -> Optional[Question]:
         try:
             question = self._questions.get_nowait()
         except queue.Empty:
@@ -236,10 +236,13 @@ class GuardNode:
 
 def main() -> None:
     """Entry point of the node: exit status 2 on bad parameters."""
+    # before any thread begins: all inherit it, and none of low priority keeps the loop from Python
+    has_priority = _ask_for_priority()
     rospy.init_node("flight_guard", disable_signals=True)
+    if not has_priority:
+        rospy.loginfo("no right to a higher priority: doc/first_flight.md, step 0")
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
-    _ask_for_priority()
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
         guard = _guard()
@@ -272,11 +275,18 @@ def _guard() -> Guard:
     return Guard(params, vehicle, parameters.limits, refusal)
 
 
-def _ask_for_priority() -> None:
+def _ask_for_priority() -> bool:
+    """Run ahead of solver, recorder and desktop, as far as the system allows it."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(REAL_TIME))
+        return True
+    except PermissionError:
+        pass
     try:
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
     except PermissionError:
-        rospy.loginfo("no right to a higher priority: doc/first_flight.md, step 0")
+        return False
+    return True
 
 
 def _vehicle_name() -> str:

@@ -64,6 +64,7 @@ class StatePort:
         self._vicon_frame = parameters.vicon_frame.strip("/")
         self.newest = math.nan  # [s] stamp of the newest attitude, as it came
         self._heard = -math.inf  # [s] steady clock, when that was
+        self._came = threading.Event()  # an attitude, since somebody waits for one
         self._jumps: Dict[str, int] = {}  # of each source, as far as they were told
 
     def subscribe(self, subscriptions: Subscriptions) -> None:
@@ -82,6 +83,11 @@ class StatePort:
     def hears(self) -> bool:
         """Whether telemetry comes, whatever its stamps say."""
         return time.monotonic() - self._heard < SILENCE
+
+    def wait_for_attitude(self, limit: float) -> bool:
+        """Wait for the next attitude, at most ``limit`` [s] of wall time; False where none came."""
+        self._came.clear()
+        return self._came.wait(limit)
 
     def start_anew(self, estimator: Estimator) -> None:
         """Forget all samples, as after a jump of the clock, and go on with another estimator."""
@@ -124,6 +130,7 @@ class StatePort:
         add = self._add_attitude or self.sources.estimator.add_attitude
         add(stamp_of(message.header), _xyzw(message.quaternion))
         self.newest, self._heard = message.header.stamp.to_sec(), time.monotonic()
+        self._came.set()
 
     def _on_imu(self, message: Imu) -> None:
         rates = _xyz(message.angular_velocity)

@@ -7,10 +7,11 @@ ROS Parameters: ~minutes, ~scenario, ~nodes (names whose memory is looked at), ~
 written, numpy's npz), ~seconds_per_sample of the memory.
 
 What is written: time (2,) [s] of begin and end on a steady clock; commands, bare [s] receipts;
-whole [s] newest telemetry to plan and tick of the guard that flew it, without the wait for that
-tick; flown [s] the same with it; bare_age [s] of the bare process; memory_t [s],
-memory_<node> [MB]; markers_t [s], markers [1], marker_points [1]; modes (statuses of each);
-flights, aborted: goals that ended, and how many of them without arrival.
+age [s] of the newest telemetry when a step of the controller begins, solved [s] its duration,
+carried [s] until its plan is received, guarded [s] what the guard spent on it up to the command,
+whole [s] all four; flown [s] the same with the wait for the guard's tick; bare_age [s] of the bare
+process; memory_t [s], memory_<node> [MB]; markers_t [s], markers [1], marker_points [1]; modes
+(statuses of each); flights, aborted: goals that ended, and how many of them without arrival.
 """
 
 import sys
@@ -42,7 +43,9 @@ class Observer:
         self.modes: Dict[int, int] = {}
         self.status: Optional[ControllerStatus] = None
         self._measures = False
-        self._plan: Optional[Tuple[float, float]] = None  # newest: telemetry to plan, telemetry [s]
+        self._plan: Optional[Tuple[float, float]] = (
+            None  # newest: telemetry to receipt, telemetry [s]
+        )
         self._marked: Dict[Tuple[str, int], int] = {}
         listen = (
             ("dji_sdk/flight_control_setpoint_generic", Joy, self._on_command),
@@ -75,8 +78,12 @@ class Observer:
         self.note("bare_age", message.axes[0])
 
     def _on_plan(self, message: Plan) -> None:
-        telemetry = message.state_stamp.to_sec()
-        self._plan = (message.header.stamp.to_sec() - telemetry + message.tick_time, telemetry)
+        telemetry, begun = message.state_stamp.to_sec(), message.header.stamp.to_sec()
+        received = rospy.Time.now().to_sec()
+        self._plan = (received - telemetry, telemetry)
+        self.note("age", begun - telemetry)
+        self.note("solved", message.tick_time)
+        self.note("carried", received - begun - message.tick_time)
 
     def _on_status(self, message: ControllerStatus) -> None:
         self.status = message
@@ -84,6 +91,7 @@ class Observer:
             self.modes[message.mode] = self.modes.get(message.mode, 0) + 1
         if message.rung == ControllerStatus.RUNG_NEW_PLAN and self._plan is not None:
             to_plan, telemetry = self._plan
+            self.note("guarded", message.tick_time)
             self.note("whole", to_plan + message.tick_time)
             self.note("flown", message.header.stamp.to_sec() + message.tick_time - telemetry)
 

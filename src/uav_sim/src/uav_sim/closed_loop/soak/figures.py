@@ -13,6 +13,7 @@ WARM_UP = 60.0  # [s] at most, a fifth of the flight else
 JITTER_ABOVE, GAP_ABOVE = 5.0, 15.0  # [ms] above the bare process
 GROWTH = 5.0  # [MB]
 TICK_P50_ABOVE, TICK_P99_ABOVE = 2.0, 8.0  # [ms] above the bare process
+PARTS = ("age", "solved", "carried", "guarded")  # of `whole`
 
 
 class Row(NamedTuple):
@@ -25,13 +26,31 @@ class Row(NamedTuple):
     passed: bool
 
 
-def figures(noted: Mapping[str, np.ndarray]) -> Dict[str, Any]:
-    """Return all figures of a flight [ms, MB, 1]; ``noted`` as ``ros/soak_node.py`` has it."""
+def figures(noted: Mapping[str, np.ndarray], quiet: Mapping[str, np.ndarray]) -> Dict[str, Any]:
+    """Return all figures [ms, MB, 1].
+
+    Args:
+        noted: of the flight on a machine that is kept busy, as ``ros/soak_node.py`` has it.
+        quiet: of the one without; the time of a tick is taken from it.
+    """
+    return {**_busy_figures(noted), **_tick_figures(quiet)}
+
+
+def _tick_figures(noted: Mapping[str, np.ndarray]) -> Dict[str, Any]:
+    age = 1e3 * noted["bare_age"][np.isfinite(noted["bare_age"])]
+    whole, flown = 1e3 * noted["whole"], 1e3 * noted["flown"]
+    return {
+        "tick_p50_ms": {"whole": _at(whole, 50), "bare": _at(age, 50), "flown": _at(flown, 50)},
+        "tick_p99_ms": {"whole": _at(whole, 99), "bare": _at(age, 99), "flown": _at(flown, 99)},
+        "parts_p50_ms": {name: _at(1e3 * noted[name], 50) for name in PARTS},
+        "parts_p99_ms": {name: _at(1e3 * noted[name], 99) for name in PARTS},
+    }
+
+
+def _busy_figures(noted: Mapping[str, np.ndarray]) -> Dict[str, Any]:
     commands, bare = _intervals(noted["commands"]), _intervals(noted["bare"])
     begin, end = noted["time"]
     silent = 1e3 * max(noted["commands"][0] - begin, end - noted["commands"][-1])
-    age = 1e3 * noted["bare_age"][np.isfinite(noted["bare_age"])]
-    whole, flown = 1e3 * noted["whole"], 1e3 * noted["flown"]
     names = [key[7:] for key in noted if key.startswith("memory_") and key != "memory_t"]
     return {
         "minutes": float((end - begin) / 60.0),
@@ -40,8 +59,6 @@ def figures(noted: Mapping[str, np.ndarray]) -> Dict[str, Any]:
         "modes": {Mode(int(mode)).name: int(count) for mode, count in noted["modes"]},
         "jitter_p99_ms": {"commands": _jitter(commands), "bare": _jitter(bare)},
         "gap_max_ms": {"commands": float(max(commands.max(), silent)), "bare": float(bare.max())},
-        "tick_p50_ms": {"whole": _at(whole, 50), "bare": _at(age, 50), "flown": _at(flown, 50)},
-        "tick_p99_ms": {"whole": _at(whole, 99), "bare": _at(age, 99), "flown": _at(flown, 99)},
         "memory_growth_mb": {n: _growth(noted["memory_t"], noted[f"memory_{n}"]) for n in names},
         "memory_mb": {n: float(noted[f"memory_{n}"][-1]) for n in names},
         "markers": {
@@ -85,9 +102,9 @@ def table(found: Mapping[str, Any]) -> str:
     """Return the rows for people."""
     jitter, gap = found["jitter_p99_ms"], found["gap_max_ms"]
     head = (
-        f"{found['minutes']:.1f} minutes, {found['flights']} flights; p99 jitter"
+        f"{found['minutes']:.1f} busy minutes, {found['flights']} flights; p99 jitter"
         f" {jitter['commands']:.1f} ms (bare {jitter['bare']:.1f}), longest gap"
-        f" {gap['commands']:.1f} ms (bare {gap['bare']:.1f}), newest state to Joy p50"
+        f" {gap['commands']:.1f} ms (bare {gap['bare']:.1f}); without load newest state to Joy p50"
         f" {found['tick_p50_ms']['whole']:.1f} ms (bare {found['tick_p50_ms']['bare']:.1f}),"
         f" with the wait for the next tick {found['tick_p50_ms']['flown']:.1f}"
     )
