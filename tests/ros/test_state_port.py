@@ -2,6 +2,7 @@
 """What of /tf and of telemetry reaches the sources; needs messages, but no master."""
 
 import dataclasses
+import threading
 import types
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 pytest.importorskip("nmpc_msgs", reason="the workspace is not built or not sourced")
 
 import rospy
-from geometry_msgs.msg import PointStamped, TransformStamped
+from geometry_msgs.msg import PointStamped, QuaternionStamped, TransformStamped
 from tf2_msgs.msg import TFMessage
 
 from nmpc_control.errors import ConfigError
@@ -79,6 +80,17 @@ def test_a_stamp_from_the_future_counts_as_now(port):
     point.header.stamp = rospy.Time.from_sec(NOW + 60.0)
     port.on["dji_sdk/local_position"](point)
     assert port.port.sources.tracks["gps"].age(NOW + 1.0) == pytest.approx(1.0)
+
+
+def test_who_waits_for_telemetry_gets_the_next_and_not_the_last(port):
+    attitude = QuaternionStamped()
+    attitude.header.stamp, attitude.quaternion.w = rospy.Time.from_sec(NOW), 1.0
+    port.on["dji_sdk/attitude"](attitude)
+    assert not port.port.wait_for_attitude(0.01)
+    later = threading.Timer(0.02, port.on["dji_sdk/attitude"], [attitude])
+    later.start()
+    assert port.port.wait_for_attitude(10.0)
+    later.join()
 
 
 def test_a_source_that_is_none_ends_the_node(port):

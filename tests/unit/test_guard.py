@@ -6,17 +6,18 @@ import math
 
 import numpy as np
 import pytest
-from flight_stub import LIMITS, PARAMS, TICK, VEHICLE, Aircraft, Flight, make_plan
+from flight_stub import GOOD, LIMITS, PARAMS, TICK, VEHICLE, Aircraft, Flight, make_plan
 
 from nmpc_control import dji
 from nmpc_control.braking import MADE_UP
 from nmpc_control.dji import FlightStatus, RcMode
-from nmpc_control.guard_data import Action
+from nmpc_control.estimator import StateEstimate
+from nmpc_control.guard_data import Action, GuardInputs
 from nmpc_control.ladder import Rung
 from nmpc_control.mode_inputs import Mode, Request
 from nmpc_control.obstacle import Obstacle
 from nmpc_control.params import load_vehicle
-from nmpc_control.state import Goal, hover_input
+from nmpc_control.state import GRAVITY, Goal, hover_input
 
 INDOORS = {"gps_health": 0, "needs_gps": False}
 LENIENT = dataclasses.replace(
@@ -103,6 +104,36 @@ def test_rungs_alternate_between_new_and_last_plan_at_a_steady_rate():
     assert rungs.count(Rung.NEW_PLAN) == 10
     assert rungs.count(Rung.LAST_PLAN) == 20
     assert gaps(flight) == pytest.approx(TICK)
+
+
+def looked_at(flight, obstacles=()):
+    """Return the tick after a look at a plan; ``obstacles`` come to be known between the two."""
+    x, solver, flight.solver = flight.aircraft.x.copy(), flight.solver, None
+    plan, goal = solver(flight.t + 0.01, x)
+    estimate = StateEstimate(flight.t + 0.01, x, 0.0, 0.0, 0.0)
+    flight.guard.look_at_plan(
+        GuardInputs(flight.t + 0.01, GOOD, estimate, plan=plan, goal=goal, obstacles=())
+    )
+    flight.obstacles = obstacles
+    return flight.tick()
+
+
+def test_a_plan_looked_at_before_the_tick_is_flown_by_it():
+    flight = Flight(aircraft=airborne()).hovering()
+    flight.solver = cruise
+    output = looked_at(flight)
+    assert (output.rung, output.mode) == (Rung.NEW_PLAN, Mode.FLYING)
+    assert flight.tick().rung is Rung.LAST_PLAN
+
+
+def test_a_plan_looked_at_is_checked_again_for_what_came_to_be_known_since():
+    flight = Flight(aircraft=airborne()).hovering()
+    ahead = [GRAVITY, 0.0, 0.1, 0.0]  # pitched: 1 m/s^2 forward
+    flight.solver = lambda t, x: (make_plan(x, t, ahead), Goal.TRAJECTORY)
+    ball = Obstacle("ball", flight.aircraft.x[:3] + [2.5, 0.0, 0.0], [0.2])
+    output = looked_at(flight, (ball,))
+    assert "the plan hits obstacle ball" in output.reason
+    assert flight.run(PARAMS.plan_check.grace + 0.1).mode is Mode.BRAKING
 
 
 def test_mode_follows_the_goal_of_the_plan():

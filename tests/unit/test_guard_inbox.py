@@ -69,3 +69,16 @@ def test_a_switch_that_leaves_f_between_two_ticks_is_not_missed(inbox):
 def test_that_obstacles_are_not_known_well_enough_stays_until_it_is_taken_back(inbox):
     inbox.obstacles_stale = "/tracker is silent"
     assert [inbox.inputs(t).obstacles_stale for t in (1.0, 1.02)] == ["/tracker is silent"] * 2
+
+
+def test_a_look_at_the_plan_leaves_everything_else_to_the_tick(inbox):
+    plan = make_plan(hover_state(np.zeros(3)), 10.0)
+    inbox.add_plan(plan, Goal.APPROACH)
+    inbox.add_plan_error("too short")
+    inbox.request, inbox.failure, inbox.landing_granted = Request.LAND, "refused", True
+    look, tick = inbox.plan_inputs(10.0), inbox.inputs(10.02)
+    assert (look.plan, look.goal, look.plan_error) == (plan, Goal.APPROACH, "too short")
+    assert (look.telemetry.request, look.telemetry.failure) == (None, "")
+    assert (tick.plan, tick.plan_error) == (None, "")
+    assert (tick.telemetry.request, tick.telemetry.failure) == (Request.LAND, "refused")
+    assert tick.telemetry.landing_granted
