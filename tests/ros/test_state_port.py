@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("nmpc_msgs", reason="the workspace is not built or not sourced")
 
 import rospy
-from geometry_msgs.msg import PointStamped, QuaternionStamped, TransformStamped
+from geometry_msgs.msg import PointStamped, TransformStamped, Vector3Stamped
 from tf2_msgs.msg import TFMessage
 
 from nmpc_control.errors import ConfigError
@@ -83,13 +83,13 @@ def test_a_stamp_from_the_future_counts_as_now(port):
 
 
 def test_who_waits_for_telemetry_gets_the_next_and_not_the_last(port):
-    attitude = QuaternionStamped()
-    attitude.header.stamp, attitude.quaternion.w = rospy.Time.from_sec(NOW), 1.0
-    port.on["dji_sdk/attitude"](attitude)
-    assert not port.port.wait_for_attitude(0.01)
-    later = threading.Timer(0.02, port.on["dji_sdk/attitude"], [attitude])
+    velocity = Vector3Stamped()
+    velocity.header.stamp = rospy.Time.from_sec(NOW)
+    port.on["dji_sdk/velocity"](velocity)
+    assert not port.port.wait_for_velocity(0.01)
+    later = threading.Timer(0.02, port.on["dji_sdk/velocity"], [velocity])
     later.start()
-    assert port.port.wait_for_attitude(10.0)
+    assert port.port.wait_for_velocity(10.0)
     later.join()
 
 

@@ -121,6 +121,7 @@ class Flight:
         self.change = {}  # telemetry that differs from good
         self.obstacles = ()
         self.stale = ""  # why the obstacles are not known well enough
+        self.early = 0.0  # [s] by which a plan is looked at before its tick
         self.log = []  # (t, inputs, output)
 
     def tick(self, request=None, **changes):
@@ -152,6 +153,9 @@ class Flight:
             obstacles=self.obstacles,
             obstacles_stale=self.stale,
         )
+        if self.early and offered is not None:
+            self.guard.look_at_plan(dataclasses.replace(inputs, t=self.t - self.early))
+            inputs = dataclasses.replace(inputs, plan=None)
         output = self.guard.tick(inputs)
         self.aircraft.serve(output.actions)
         self.aircraft.fly(self.t, output.axes if self.aircraft.authority else None)

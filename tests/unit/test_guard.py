@@ -106,7 +106,7 @@ def test_rungs_alternate_between_new_and_last_plan_at_a_steady_rate():
     assert gaps(flight) == pytest.approx(TICK)
 
 
-def looked_at(flight, obstacles=()):
+def looked_at(flight, obstacles=(), late=0.0):
     """Return the tick after a look at a plan; ``obstacles`` come to be known between the two."""
     x, solver, flight.solver = flight.aircraft.x.copy(), flight.solver, None
     plan, goal = solver(flight.t + 0.01, x)
@@ -114,7 +114,7 @@ def looked_at(flight, obstacles=()):
     flight.guard.look_at_plan(
         GuardInputs(flight.t + 0.01, GOOD, estimate, plan=plan, goal=goal, obstacles=())
     )
-    flight.obstacles = obstacles
+    flight.obstacles, flight.t = obstacles, flight.t + late
     return flight.tick()
 
 
@@ -124,6 +124,14 @@ def test_a_plan_looked_at_before_the_tick_is_flown_by_it():
     output = looked_at(flight)
     assert (output.rung, output.mode) == (Rung.NEW_PLAN, Mode.FLYING)
     assert flight.tick().rung is Rung.LAST_PLAN
+
+
+def test_a_plan_looked_at_is_not_flown_when_its_tick_comes_late():
+    flight = Flight(aircraft=airborne()).hovering()
+    flight.solver, stall = cruise, PARAMS.plan_check.timeout + 0.1
+    output = looked_at(flight, late=stall)
+    assert output.mode is Mode.BRAKING
+    assert "s old" in output.reason
 
 
 def test_a_plan_looked_at_is_checked_again_for_what_came_to_be_known_since():

@@ -125,6 +125,11 @@ class Story(RuleBasedStateMachine):
         self.flight.solver = solver
         self.flight.run(0.2)
 
+    @rule(early=st.sampled_from([0.0, 0.005, 0.015]))
+    def look(self, early):
+        self.flight.early = early
+        self.flight.run(0.2)
+
     @rule(step=st.sampled_from([-50.0, -0.3, 0.4, 30.0]))
     def set_clock(self, step):
         self.flight.t += step

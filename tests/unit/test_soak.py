@@ -34,6 +34,7 @@ def noted(**changes):
         "flights": np.array(5),
         "aborted": np.array(0),
         "modes": np.array([[3, 900], [4, 100]]),
+        "scheduling": np.array(2),
     }
     return {**good, **changes}
 
@@ -86,6 +87,8 @@ def test_the_time_of_a_tick_is_that_of_the_flight_without_load():
     slow = noted(whole=np.full(1000, 0.030))
     assert all(row.passed for row in rows(figures(slow, noted())))
     assert not all(row.passed for row in rows(figures(noted(), slow)))
+    braked = noted(aborted=np.array(2))
+    assert not all(row.passed for row in rows(figures(noted(), braked)))
 
 
 def test_memory_counts_after_the_warm_up():

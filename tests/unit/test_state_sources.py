@@ -257,7 +257,17 @@ def test_a_position_that_repeats_itself_while_the_velocity_leads_away_grows_old(
     assert 0.35 < max(believed) < 0.5  # 0.5 m at 1.14 m/s
     assert sources.refused()[f"{name} frozen"] > 100
     assert sources.estimator.age("position", 3.0) > 2.5
-    assert sources.add_position(name, 3.01, place(0.1))  # it goes on: it is one again
+    assert not repeats(sources, name, 3.0, np.zeros(3), seconds=60.0)  # at rest: as wrong as before
+    assert sources.add_position(name, 63.01, place(0.1))  # it goes on: it is one again
+
+
+def test_a_height_that_goes_on_does_not_hide_a_place_that_stands():
+    sources = StateSources(load_source_parameters(), Estimator())
+    believed = []
+    for t in 0.01 * np.arange(1, 300):
+        sources.add_velocity(t, np.array([1.0, 0.0, 0.1]))
+        believed.append(sources.add_position(GPS, t, (1.0, 2.0, 3.0 + 0.1 * t)))
+    assert 45 < sum(believed) < 60
 
 
 def test_twin_at_rest_it_is_believed_for_minutes_whatever_the_velocity_is_off_by():

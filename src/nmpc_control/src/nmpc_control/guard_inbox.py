@@ -22,7 +22,8 @@ _FAR = 1e6  # [s]
 class GuardInbox:
     """Newest message of each kind.
 
-    ``inputs(t)`` gives what a tick at ``t`` sees and empties plan and request.
+    ``inputs(t)`` gives what a tick at ``t`` sees and empties plan and request; ``plan_inputs(t)``
+    the plan alone, before the tick.
     """
 
     def __init__(self, params: GuardParameters) -> None:

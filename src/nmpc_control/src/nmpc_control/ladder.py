@@ -186,7 +186,7 @@ class PlanLadder:
         if self.plan is None:
             return Rung.NONE, self._verdict
         rung = Rung.NEW_PLAN if self._is_new else Rung.LAST_PLAN
-        if self._is_new and obstacles is self._seen:
+        if self._is_new and t == self._came and obstacles is self._seen:
             verdict = self._verdict
         else:
             unchanged = obstacles is self._seen and isinstance(obstacles, ObstacleField)
@@ -202,6 +202,8 @@ class PlanLadder:
             verdict = self._lesser_evil(verdict, brake_clearance)
         verdict = self._flown_on(t, verdict, time_to_stop)
         if not verdict.ok:
+            if self._is_new:
+                self.rejected, self._verdict = self.rejected + 1, verdict
             self.verified = 0
             return Rung.NONE, self._with_rejection(verdict)
         if self._hold_since is not None and t - self._hold_since > self.hold_timeout:
@@ -211,7 +213,7 @@ class PlanLadder:
 
     def _with_rejection(self, verdict: Verdict) -> Verdict:
         """Return the verdict on the last verified plan, led by why the newest one was refused."""
-        if self._verdict.ok:
+        if self._verdict.ok or self._verdict is verdict:
             return verdict
         sentence = f"{self._verdict.sentence}, and {verdict.sentence}"
         return replace(verdict, finding=self._verdict.finding, sentence=sentence)

@@ -23,7 +23,7 @@ class Liveness:
         self._sources: Dict[str, _Source] = {}
 
     def age(self, name: str, stamp: float, t: float, now: float) -> float:
-        """Return the age [s] of a source's newest sample; call it in every tick.
+        """Return the age [s] of a source's newest sample; call it at least in every tick.
 
         Args:
             name: of the source.

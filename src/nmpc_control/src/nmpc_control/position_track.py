@@ -3,7 +3,8 @@
 
 A sample far off the expected place is not believed. Samples that go on to agree with each other are
 the new truth after ``jump_time``: the source's origin has moved, or it was wrong until now. One
-that repeats itself to the last digit while the velocity leads away is not believed either.
+that repeats itself to the last digit while the velocity leads away is frozen, and not believed
+before it changes.
 """
 
 import math
@@ -51,7 +52,8 @@ class PositionTrack:
         self._motion: Optional[Motion] = None
         self._doubt: Optional[_Doubt] = None
         self._told = (-math.inf, np.full(3, math.nan))  # [s], [m] newest, believed or not
-        self._led = STILL  # [m] by the velocity since the samples differed last
+        self._led = STILL  # [m] by the velocity since the samples differed last, on each axis
+        self._frozen = np.zeros(3, dtype=bool)  # axes on which they must differ again
 
     def age(self, t: float) -> float:
         """Return the age [s] at ``t`` of the newest sample that was believed; inf without."""
@@ -107,15 +109,23 @@ class PositionTrack:
         return motion._replace(position=motion.position + (since - bent) * motion.velocity)
 
     def _is_frozen(self, t: float, place: np.ndarray, velocity: Optional[np.ndarray]) -> bool:
-        """Return whether a sample is the old one again though the aircraft has moved on."""
+        """Return whether a sample is the old one again though the aircraft has moved on.
+
+        At rest the two agree again; what was frozen stays so until it changes.
+        """
         (before, last), self._told = self._told, (t, place)
-        if not np.array_equal(place, last):
-            self._led = STILL
+        differs = place != last
+        if self._frozen.any():
+            if not differs[self._frozen].all():
+                return True
+            self._frozen[:] = False
+        fading = math.exp(-max(0.0, t - before) / DRIFT_MEMORY)
+        way = STILL if velocity is None else DRIFT_MEMORY * (1.0 - fading) * velocity
+        self._led = np.where(differs, 0.0, self._led * fading + way)
+        if np.linalg.norm(self._led) <= self.parameters.still:
             return False
-        dt = t - before
-        way = STILL if velocity is None else dt * velocity
-        self._led = self._led * math.exp(-dt / DRIFT_MEMORY) + way
-        return bool(np.linalg.norm(self._led) > self.parameters.still)
+        self._frozen = np.abs(self._led) > self.parameters.still / 2.0
+        return True
 
     def _begin(self, t: float, place: np.ndarray, velocity: Optional[np.ndarray]) -> None:
         self._doubt, self._t = None, t

@@ -59,7 +59,7 @@ from nmpc_control.state import POSITION, YAW
 from nmpc_control.tuning import Tuning
 from nmpc_msgs.msg import ControllerStatus, PositionSource
 
-TELEMETRY_WAIT = 0.02  # [s] of wall time: a plan is made from a state that has just come
+TELEMETRY_WAIT = 0.025  # [s] of wall time: a plan is made from a state that has just come
 
 
 class ControllerNode:
@@ -116,13 +116,15 @@ class ControllerNode:
             except Exception:  # noqa: BLE001 (one bad tick must not end the control of an aircraft)
                 rospy.logerr_throttle(1.0, f"control step failed: {traceback.format_exc(limit=-3)}")
                 self.controller.nmpc.reset()
+            is_late = rate.remaining() <= rospy.Duration(0)
             try:
                 rate.sleep()
             except rospy.ROSTimeMovedBackwardsException:
                 continue  # seen above, like a computer's own clock, of which rospy does not tell
             except rospy.ROSInterruptException:
                 break
-            self.state.wait_for_attitude(TELEMETRY_WAIT)
+            if not is_late:
+                self.state.wait_for_velocity(TELEMETRY_WAIT)
 
     def _start_anew(self) -> None:
         """Forget everything that carries a time, as after a jump of the clock."""

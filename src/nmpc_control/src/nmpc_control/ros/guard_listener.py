@@ -23,6 +23,7 @@ from nmpc_control.ros.conversions import MessageError, plan_from_msg
 from nmpc_control.ros.obstacle_port import ObstaclePort
 from nmpc_control.ros.state_port import StatePort, now, stamp_of
 from nmpc_control.ros.subscriptions import Subscriptions
+from nmpc_control.ros.wake_up import WakeUp
 from nmpc_control.source_params import GPS
 from nmpc_msgs.msg import Plan
 
@@ -37,7 +38,7 @@ class GuardListener:
         self.obstacles = ObstaclePort(params.world_frame)
         self._inbox = GuardInbox(params)
         self._lock = threading.Lock()
-        self._plan_came = threading.Event()
+        self._plan_came = WakeUp()
         self.state = StatePort(self._inbox.estimator, params.world_frame, self._lock)
         subscriptions = Subscriptions()
         self.state.subscribe(subscriptions)

@@ -163,13 +163,13 @@ class GuardNode:
 
     def _tick(self, now: rospy.Time, last_request: Optional[Request]) -> None:
         if now.to_sec() < self._t - CLOCK_STEP:
-            self._t = now.to_sec()
+            self._t, self._looked = now.to_sec(), 0.0
             self._listener.start_anew()
             time.sleep(HEAR_AGAIN)  # or all that was heard before the jump would count as missing
             return
+        begun, self._looked = time.perf_counter() - self._looked, 0.0
         t = max(now.to_sec(), self._t)  # a small step back: time stands still until it is caught up
         self._t = t
-        begun, self._looked = time.perf_counter() - self._looked, 0.0
         question = self._next_question()
         request = question.request if question else None
         self._telemetry, self._has_sent = ModeInputs(), False  # nothing of this tick yet
@@ -236,11 +236,11 @@ class GuardNode:
 
 def main() -> None:
     """Entry point of the node: exit status 2 on bad parameters."""
-    # before any thread begins: all inherit it, and none of low priority keeps the loop from Python
-    has_priority = _ask_for_priority()
+    # before any thread of ours begins: all inherit it, and none that runs Python comes after others
+    priority = _ask_for_priority()
     rospy.init_node("flight_guard", disable_signals=True)
-    if not has_priority:
-        rospy.loginfo("no right to a higher priority: doc/first_flight.md, step 0")
+    if priority:
+        rospy.loginfo(priority)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     sys.setswitchinterval(SWITCH_INTERVAL)
@@ -275,18 +275,19 @@ def _guard() -> Guard:
     return Guard(params, vehicle, parameters.limits, refusal)
 
 
-def _ask_for_priority() -> bool:
-    """Run ahead of solver, recorder and desktop, as far as the system allows it."""
+def _ask_for_priority() -> str:
+    """Run ahead of solver, recorder and desktop; return what the system does not allow, if so."""
+    told = "doc/first_flight.md, step 0"
     try:
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(REAL_TIME))
-        return True
-    except PermissionError:
+        return ""
+    except OSError:
         pass
     try:
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
-    except PermissionError:
-        return False
-    return True
+    except OSError:
+        return f"no right to a higher priority: {told}"
+    return f"no right to real time, only to niceness {NICENESS}: {told}"
 
 
 def _vehicle_name() -> str:

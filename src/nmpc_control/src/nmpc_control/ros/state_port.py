@@ -28,6 +28,7 @@ from tf2_msgs.msg import TFMessage
 
 from nmpc_control.estimator import Estimator
 from nmpc_control.ros.subscriptions import Subscriptions
+from nmpc_control.ros.wake_up import WakeUp
 from nmpc_control.source_params import (
     GPS,
     VICON,
@@ -64,7 +65,7 @@ class StatePort:
         self._vicon_frame = parameters.vicon_frame.strip("/")
         self.newest = math.nan  # [s] stamp of the newest attitude, as it came
         self._heard = -math.inf  # [s] steady clock, when that was
-        self._came = threading.Event()  # an attitude, since somebody waits for one
+        self._came = WakeUp()  # by velocities
         self._jumps: Dict[str, int] = {}  # of each source, as far as they were told
 
     def subscribe(self, subscriptions: Subscriptions) -> None:
@@ -84,8 +85,11 @@ class StatePort:
         """Whether telemetry comes, whatever its stamps say."""
         return time.monotonic() - self._heard < SILENCE
 
-    def wait_for_attitude(self, limit: float) -> bool:
-        """Wait for the next attitude, at most ``limit`` [s] of wall time; False where none came."""
+    def wait_for_velocity(self, limit: float) -> bool:
+        """Wait for the next velocity, at most ``limit`` [s] of wall time; False where none came.
+
+        Of what comes in one packet attitude and rates are there before it.
+        """
         self._came.clear()
         return self._came.wait(limit)
 
@@ -130,7 +134,6 @@ class StatePort:
         add = self._add_attitude or self.sources.estimator.add_attitude
         add(stamp_of(message.header), _xyzw(message.quaternion))
         self.newest, self._heard = message.header.stamp.to_sec(), time.monotonic()
-        self._came.set()
 
     def _on_imu(self, message: Imu) -> None:
         rates = _xyz(message.angular_velocity)
@@ -138,6 +141,7 @@ class StatePort:
 
     def _on_velocity(self, message: Vector3Stamped) -> None:
         self.sources.add_velocity(stamp_of(message.header), _xyz(message.vector))
+        self._came.set()
 
     def _point_taker(self, name: str) -> Callable[[PointStamped], None]:
         def take(message: PointStamped) -> None:

@@ -11,9 +11,11 @@ age [s] of the newest telemetry when a step of the controller begins, solved [s]
 carried [s] until its plan is received, guarded [s] what the guard spent on it up to the command,
 whole [s] all four; flown [s] the same with the wait for the guard's tick; bare_age [s] of the bare
 process; memory_t [s], memory_<node> [MB]; markers_t [s], markers [1], marker_points [1]; modes
-(statuses of each); flights, aborted: goals that ended, and how many of them without arrival.
+(statuses of each); flights, aborted: goals that ended, and how many of them without arrival;
+scheduling: policy of the guard's process.
 """
 
+import os
 import sys
 import threading
 import time
@@ -125,7 +127,9 @@ def main() -> None:
     end = begin + 60.0 * minutes
     names = str(rospy.get_param("~nodes")).split()
     period = float(rospy.get_param("~seconds_per_sample"))
-    arguments = (observer, _processes(names), period, end)
+    processes = _processes(names)
+    scheduling = os.sched_getscheduler(processes["flight_guard"])
+    arguments = (observer, processes, period, end)
     threading.Thread(target=_watch_memory, args=arguments, daemon=True).start()
     flights = aborted = 0
     while time.monotonic() < end and not rospy.is_shutdown():
@@ -141,6 +145,7 @@ def main() -> None:
         Path(str(rospy.get_param("~file"))),
         time=np.array([begin, time.monotonic()]),
         flights=flights,
+        scheduling=scheduling,
         aborted=aborted,
         modes=np.array(sorted(observer.modes.items())),
         **series,

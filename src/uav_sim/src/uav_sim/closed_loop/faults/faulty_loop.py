@@ -73,6 +73,20 @@ class FaultyLoop(ClosedLoop):
             steps = trouble.deliver(self.t, steps)
         for step in steps:
             super().deliver(step)
+        if steps and self._guard_runs:
+            self._look_ahead()
+
+    @property
+    def _guard_runs(self) -> bool:
+        hears = self.t >= self._deaf_until
+        return hears and all(trouble.runs(self.t) for trouble in self.troubles)
+
+    def _look_ahead(self) -> None:
+        """Have the guard check a plan when it comes, as its node does."""
+        try:
+            self.guard.look_at_plan(self.inbox.plan_inputs(self.now, self.t))
+        except Exception as error:  # noqa: BLE001 (as in its node: a plan is refused)
+            self.guard.ladder.refuse(f"its check failed: {type(error).__name__}: {error}")
 
     def heard(self) -> List[Packet]:
         """Advance the aircraft by one step; return what is heard of it."""
@@ -134,7 +148,7 @@ class FaultyLoop(ClosedLoop):
         if self.escape is not None:
             super().send(self.escape)
             return
-        if not all(trouble.runs(self.t) for trouble in self.troubles) or self.t < self._deaf_until:
+        if not self._guard_runs:
             return
         if self._guard_clock.went_back(self.now):
             self._deaf_until = self.t + HEAR_AGAIN

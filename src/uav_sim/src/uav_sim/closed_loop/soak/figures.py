@@ -13,6 +13,7 @@ WARM_UP = 60.0  # [s] at most, a fifth of the flight else
 JITTER_ABOVE, GAP_ABOVE = 5.0, 15.0  # [ms] above the bare process
 GROWTH = 5.0  # [MB]
 TICK_P50_ABOVE, TICK_P99_ABOVE = 2.0, 8.0  # [ms] above the bare process
+SCHEDULING = {0: "shared time", 2: "real time, round robin"}
 PARTS = ("age", "solved", "carried", "guarded")  # of `whole`
 
 
@@ -33,7 +34,16 @@ def figures(noted: Mapping[str, np.ndarray], quiet: Mapping[str, np.ndarray]) ->
         noted: of the flight on a machine that is kept busy, as ``ros/soak_node.py`` has it.
         quiet: of the one without; the time of a tick is taken from it.
     """
-    return {**_busy_figures(noted), **_tick_figures(quiet)}
+    return {
+        **_busy_figures(noted),
+        **_tick_figures(quiet),
+        "busy_tick": _tick_figures(noted),
+        "quiet": {"aborted": int(quiet["aborted"]), "modes": _modes(quiet)},
+    }
+
+
+def _modes(noted: Mapping[str, np.ndarray]) -> Dict[str, int]:
+    return {Mode(int(mode)).name: int(count) for mode, count in noted["modes"]}
 
 
 def _tick_figures(noted: Mapping[str, np.ndarray]) -> Dict[str, Any]:
@@ -56,7 +66,8 @@ def _busy_figures(noted: Mapping[str, np.ndarray]) -> Dict[str, Any]:
         "minutes": float((end - begin) / 60.0),
         "flights": int(noted["flights"]),
         "aborted": int(noted["aborted"]),
-        "modes": {Mode(int(mode)).name: int(count) for mode, count in noted["modes"]},
+        "modes": _modes(noted),
+        "guard_scheduling": SCHEDULING.get(int(noted["scheduling"]), "unknown"),
         "jitter_p99_ms": {"commands": _jitter(commands), "bare": _jitter(bare)},
         "gap_max_ms": {"commands": float(max(commands.max(), silent)), "bare": float(bare.max())},
         "memory_growth_mb": {n: _growth(noted["memory_t"], noted[f"memory_{n}"]) for n in names},
@@ -87,8 +98,8 @@ def rows(found: Mapping[str, Any]) -> List[Row]:
             _above(found["tick_p99_ms"], "whole"),
             TICK_P99_ABOVE,
         ),
-        ("flights that did not arrive", "1", found["aborted"], 0.0),
-        ("statuses of no automatic flight", "1", _not_flown(found["modes"]), 0.0),
+        ("flights that did not arrive", "1", found["aborted"] + found["quiet"]["aborted"], 0.0),
+        ("statuses of no automatic flight", "1", _not_flown(found), 0.0),
         ("markers more than before", "1", found["markers"]["growth"], 0.0),
     ]
     kept += [
@@ -106,7 +117,9 @@ def table(found: Mapping[str, Any]) -> str:
         f" {jitter['commands']:.1f} ms (bare {jitter['bare']:.1f}), longest gap"
         f" {gap['commands']:.1f} ms (bare {gap['bare']:.1f}); without load newest state to Joy p50"
         f" {found['tick_p50_ms']['whole']:.1f} ms (bare {found['tick_p50_ms']['bare']:.1f}),"
-        f" with the wait for the next tick {found['tick_p50_ms']['flown']:.1f}"
+        f" with the wait for the next tick {found['tick_p50_ms']['flown']:.1f}; of it "
+        + ", ".join(f"{name} {ms:.1f}" for name, ms in found["parts_p50_ms"].items())
+        + f"; the guard runs in {found['guard_scheduling']}"
     )
     lines = [
         f"{'passed' if row.passed else 'FAILED':8}{row.name:38}{row.value:9.2f} {row.unit:3}"
@@ -116,8 +129,9 @@ def table(found: Mapping[str, Any]) -> str:
     return "\n".join([head, *lines])
 
 
-def _not_flown(modes: Mapping[str, int]) -> int:
-    return sum(count for name, count in modes.items() if Mode[name] not in STREAMING)
+def _not_flown(found: Mapping[str, Any]) -> int:
+    modes = [*found["modes"].items(), *found["quiet"]["modes"].items()]
+    return sum(count for name, count in modes if Mode[name] not in STREAMING)
 
 
 def _intervals(came: np.ndarray) -> np.ndarray:
