@@ -72,8 +72,11 @@ def check_services(seen):
             "'bird' is not added, it moves: only a node that goes on publishing `obstacles` can say"
             " where it is",
         ],
-        [False, "'thin' cannot be used: size"],
-        [False, "'tree' was not added: the scenario or its sender takes it back"],
+        [
+            False,
+            "'thin' cannot be used: size; [radius] of a sphere, [radius, height] of a cylinder, [x, y, z] of a box, in m and > 0",
+        ],
+        [False, "'tree' was not added here: who told of it, as the scenario, keeps it"],
         [True, "removed: 'mast'"],
         [
             True,

@@ -33,6 +33,9 @@ from nmpc_msgs.srv import (
     RemoveObstacleResponse,
 )
 
+SIZES = "[radius] of a sphere, [radius, height] of a cylinder, [x, y, z] of a box, in m and > 0"
+EXPECTED = {"id": "; 1 to 64 printable characters", "size": f"; {SIZES}"}
+
 
 class ObstacleServices:
     """Keeps what was added; every service call has a thread of its own."""
@@ -58,7 +61,8 @@ class ObstacleServices:
             again = "; call again in a second" if self._port.frames.is_new else ""
             return AddObstacleResponse(False, f"{error}{again}")
         if found:
-            return AddObstacleResponse(False, f"{sighting.id!r} cannot be used: {found}")
+            words = f"{sighting.id!r} cannot be used: {found}{EXPECTED.get(found, '')}"
+            return AddObstacleResponse(False, words)
         if sighting.moves:
             words = "it moves: only a node that goes on publishing `obstacles` can say where it is"
             return AddObstacleResponse(False, f"{sighting.id!r} is not added, {words}")
@@ -90,7 +94,7 @@ class ObstacleServices:
             return True, f"removed: {', '.join(map(repr, gone))}"
         if not name:
             return False, "none was added"
-        return False, f"{name!r} was not added: the scenario or its sender takes it back"
+        return False, f"{name!r} was not added here: who told of it, as the scenario, keeps it"
 
     def _forget(self, request: RemoveObstacleRequest) -> Tuple[bool, str]:
         if request.id:

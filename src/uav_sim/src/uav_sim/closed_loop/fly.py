@@ -106,6 +106,8 @@ def _fly(options: argparse.Namespace, scenario: Scenario, bag: Path) -> Optional
         f"bag:={bag.resolve()}",
         f"rviz:={str(options.rviz).lower()}",
     ]
+    if options.rviz and not os.environ.get("DISPLAY"):
+        _say("there is no display (DISPLAY is not set): RViz will not open")
     log, master = bag.with_suffix(".log"), environment["ROS_MASTER_URI"]
     _say(f"flying {scenario.name} on {options.plant}, ROS_MASTER_URI={master}, log {log}")
     with open(log, "w", encoding="utf-8") as output:
