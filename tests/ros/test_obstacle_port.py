@@ -74,7 +74,8 @@ def check_services(seen):
         ],
         [
             False,
-            "'thin' cannot be used: size; [radius] of a sphere, [radius, height] of a cylinder, [x, y, z] of a box, in m and > 0",
+            "'thin' cannot be used: size; [radius] of a sphere, [radius, height] of a cylinder, "
+            "[x, y, z] of a box, in m and > 0",
         ],
         [False, "'tree' was not added here: who told of it, as the scenario, keeps it"],
         [True, "removed: 'mast'"],
