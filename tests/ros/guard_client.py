@@ -71,6 +71,9 @@ class Client:
         pose = PoseStamped(header=Header(frame_id="world"))
         pose.pose.position = Point(x, y, z)
         pose.pose.orientation.w = 1.0
+        end = rospy.Time.now() + rospy.Duration(20.0)
+        while not self.target.get_num_connections() and rospy.Time.now() < end:
+            rospy.sleep(0.02)
         self.target.publish(pose)
 
     def modes(self):

@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 
 from nmpc_control.ros.known_service import KnownService
 from nmpc_msgs.msg import Plan
-from nmpc_msgs.srv import ClearFault, InjectFault
+from nmpc_msgs.srv import ClearFault, InjectFault, RemoveObstacle
 
 CALLER = "/process_client"
 SERVICES = ("start", "hover", "land")
@@ -53,6 +53,7 @@ class Watcher(Client):
         rospy.Subscriber("nmpc/plan", Plan, self._on_plan, queue_size=100)
         self.inject = rospy.ServiceProxy("uav_sim/inject_fault", InjectFault)
         self.clear = rospy.ServiceProxy("uav_sim/clear_fault", ClearFault)
+        self.forget = rospy.ServiceProxy("remove_obstacle", RemoveObstacle)
         self.services = {name: KnownService(name, Trigger) for name in SERVICES}
 
     def _note(self, name, numbers):
@@ -74,6 +75,7 @@ class Watcher(Client):
 
     def settle(self):
         """Return when it hovers; starts where that is needed."""
+        self.wait_for(lambda: self.position is not None)
         self.wait_for(lambda: self.statuses and self.mode not in ("WAITING", "MANUAL"))
         if self.mode not in ("HOVERING", "BRAKING", "FLYING"):
             self.start()
@@ -174,11 +176,11 @@ def authority_taken(client):
 
 
 def app_takes_authority(client):
-    """A mobile app takes authority in flight for a moment, and no topic shows it."""
+    """A mobile app takes authority in flight, and no topic shows it; nobody gives it back."""
     client.go_to(client.position[0] + 12.0, 0.0, 3.0)
     client.wait("FLYING")
     rospy.sleep(1.5)
-    return client.fault("authority_taken", "{by: app}", 1.2, ())
+    return client.fault("authority_taken", "{by: app}", 6.0, ("RELEASED",))
 
 
 def solver_stalls(client):
@@ -203,6 +205,10 @@ def node_ends(client, node, number):
     seen = client.report(since, 2.5)
     seen["back"] = is_back(f"/{node}")
     seen["mode"] = client.mode
+    if node == "nmpc_traffic":  # where the others are is not known any more, until somebody says so
+        client.wait_for(lambda: client.statuses[-1].reason_code == "held_back")
+        seen["held_back"] = client.statuses[-1].reason
+        seen["forgotten"] = client.forget("", f"/{node}").success
     return seen
 
 
