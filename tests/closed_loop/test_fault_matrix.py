@@ -168,8 +168,9 @@ def test_twin_a_memory_without_room_for_near_ones_holds_back_or_hits(
 
 
 def without_obstacles(loop):
-    judge = loop.judge
+    judge, look = loop.judge, loop.guard.look_at_plan
     loop.judge = lambda inputs: judge(dataclasses.replace(inputs, obstacles=()))
+    loop.guard.look_at_plan = lambda inputs: look(dataclasses.replace(inputs, obstacles=()))
 
 
 def test_twin_a_guard_that_knows_no_obstacles_hits_one_which_could_have_been_avoided():

@@ -4,6 +4,7 @@
 Generated once, cached by source, compiler, flags and processor.
 """
 
+import ctypes
 import hashlib
 import logging
 import os
@@ -11,8 +12,9 @@ import platform
 import shutil
 import subprocess
 import tempfile
+from functools import partial
 from pathlib import Path
-from typing import Dict, Optional, Sequence
+from typing import Callable, Dict, Optional, Sequence
 
 import casadi as ca
 import numpy as np
@@ -52,7 +54,7 @@ def compile_functions(
     for _ in range(2):
         try:
             library = _library(functions, program)
-            return {name: ca.external(name, str(library)) for name in interpreted}
+            return {name: Native(name, library) for name in interpreted}
         except (OSError, subprocess.CalledProcessError) as error:
             detail = getattr(error, "stderr", "") or str(error)
             break
@@ -105,10 +107,20 @@ def _processor() -> str:
     return f"{platform.machine()} {platform.processor()}"
 
 
-class Buffered:
-    """A CasADi function called through fixed buffers.
+class Native(ca.Function):
+    """A function of a compiled library, which it remembers."""
 
-    No allocation, the GIL is released during the call.
+    def __init__(self, name: str, library: Path) -> None:
+        """Load it; raises RuntimeError where the file holds no such function."""
+        super().__init__(ca.external(name, str(library)))
+        self.library = library
+
+
+class Buffered:
+    """A CasADi function called through fixed buffers, without allocation.
+
+    Compiled code is called with Python's lock held: a solve is some twenty calls of a tenth of a
+    millisecond, and at each release a thread that reads messages would come in between.
 
     ``inputs[name]`` and ``outputs[name]`` are numpy arrays (Fortran order) that the call reads and
     writes.
@@ -118,17 +130,43 @@ class Buffered:
         self, function: ca.Function, shared: Optional[Dict[str, np.ndarray]] = None
     ) -> None:
         self._function = function
-        self._buffer, self._trigger = function.buffer()
         self.inputs: Dict[str, np.ndarray] = {}
         self.outputs: Dict[str, np.ndarray] = {}
         for i in range(function.n_in()):
             array = self._array(function.name_in(i), function.size_in(i), shared)
             self.inputs[function.name_in(i)] = array
-            self._buffer.set_arg(i, memoryview(array.T))
         for i in range(function.n_out()):
             array = self._array(function.name_out(i), function.size_out(i), shared)
             self.outputs[function.name_out(i)] = array
-            self._buffer.set_res(i, memoryview(array.T))
+        self._call = self._native() if isinstance(function, Native) else self._interpreted()
+
+    def _native(self) -> Callable[[], int]:
+        """Return the call of the compiled function by CasADi's C interface."""
+        f = self._function
+        pointer = ctypes.c_void_p
+        arguments, results = (pointer * f.sz_arg())(), (pointer * f.sz_res())()
+        for k, array in enumerate(self.inputs.values()):
+            arguments[k] = array.ctypes.data
+        for k, array in enumerate(self.outputs.values()):
+            results[k] = array.ctypes.data
+        work = (ctypes.c_longlong * (f.sz_iw() + 1))(), (ctypes.c_double * (f.sz_w() + 1))()
+        memory = (arguments, results, *work)
+        function = getattr(ctypes.PyDLL(str(f.library)), f.name())
+        function.argtypes, function.restype = [*[pointer] * 4, ctypes.c_int], ctypes.c_int
+        return partial(function, *map(ctypes.cast, memory, [pointer] * 4), 0)
+
+    def _interpreted(self) -> Callable[[], int]:
+        buffer, trigger = self._function.buffer()
+        for i, array in enumerate(self.inputs.values()):
+            buffer.set_arg(i, memoryview(array.T))
+        for i, array in enumerate(self.outputs.values()):
+            buffer.set_res(i, memoryview(array.T))
+
+        def call() -> int:
+            trigger()
+            return buffer.ret()
+
+        return call
 
     @staticmethod
     def _array(
@@ -143,5 +181,4 @@ class Buffered:
 
     def __call__(self) -> bool:
         """Evaluate; returns whether the function reported success."""
-        self._trigger()
-        return self._buffer.ret() == 0
+        return self._call() == 0

@@ -55,6 +55,7 @@ HEAR_AGAIN = 0.1  # [s] of wall time for telemetry after a jump
 PLAN_CHECK = 0.005  # [s] a look at a plan takes; with less left before a tick, it is part of it
 ANSWER_TIMEOUT = 2.0  # [s] wall time in which a tick must answer a service call
 SWITCH_INTERVAL = 5e-4  # [s] for which a thread that reads messages may keep the loop waiting
+TICK_INTERVAL = 0.01  # [s] for which a tick keeps those waiting
 REAL_TIME = 1  # real-time priority, the lowest
 NICENESS = -10  # where the system grants no real time
 
@@ -105,11 +106,13 @@ class GuardNode:
         ticked = time.monotonic()
         while not rospy.is_shutdown():
             is_last = self._must_stop()
+            sys.setswitchinterval(TICK_INTERVAL)
             try:
                 self._tick(rospy.Time.now(), Request.RELEASE if is_last else None)
             except Exception as error:  # noqa: BLE001 (the stream must not end with one bad message)
                 rospy.logerr_throttle(1.0, f"tick failed: {traceback.format_exc(limit=-3)}")
                 self._give_way(error)
+            sys.setswitchinterval(SWITCH_INTERVAL)
             if is_last:
                 break
             try:
@@ -243,7 +246,6 @@ def main() -> None:
         rospy.loginfo(priority)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
-    sys.setswitchinterval(SWITCH_INTERVAL)
     try:
         guard = _guard()
         node = GuardNode(guard, bool(rospy.get_param("~avoidance", True)))
