@@ -208,7 +208,7 @@ def node_ends(client, node, number):
     if node == "nmpc_traffic":  # where the others are is not known any more, until somebody says so
         client.wait_for(lambda: client.statuses[-1].reason_code == "held_back")
         seen["held_back"] = client.statuses[-1].reason
-        seen["forgotten"] = client.forget("", f"/{node}").success
+        seen["forgotten"] = client.forget(f"/{node}", "").success
     return seen
 
 
