@@ -42,11 +42,17 @@ def test_telemetry_is_read_with_its_age(inbox):
     assert inputs.height == 1.5
 
 
-def test_plan_request_and_failure_reach_one_tick_only(inbox):
+def filled(inbox, request):
+    """Let a plan and all that one tick takes be heard; return the plan."""
     plan = make_plan(hover_state(np.zeros(3)), 10.0)
     inbox.add_plan(plan, Goal.APPROACH)
     inbox.add_plan_error("too short")
-    inbox.request, inbox.failure, inbox.landing_granted = Request.START, "refused", True
+    inbox.request, inbox.failure, inbox.landing_granted = request, "refused", True
+    return plan
+
+
+def test_plan_request_and_failure_reach_one_tick_only(inbox):
+    plan = filled(inbox, Request.START)
     first, second = inbox.inputs(10.0), inbox.inputs(10.02)
     assert first.plan is plan
     assert (first.goal, first.plan_error) == (Goal.APPROACH, "too short")
@@ -72,10 +78,7 @@ def test_that_obstacles_are_not_known_well_enough_stays_until_it_is_taken_back(i
 
 
 def test_a_look_at_the_plan_leaves_everything_else_to_the_tick(inbox):
-    plan = make_plan(hover_state(np.zeros(3)), 10.0)
-    inbox.add_plan(plan, Goal.APPROACH)
-    inbox.add_plan_error("too short")
-    inbox.request, inbox.failure, inbox.landing_granted = Request.LAND, "refused", True
+    plan = filled(inbox, Request.LAND)
     look, tick = inbox.plan_inputs(10.0), inbox.inputs(10.02)
     assert (look.plan, look.goal, look.plan_error) == (plan, Goal.APPROACH, "too short")
     assert (look.telemetry.request, look.telemetry.failure) == (None, "")

@@ -144,11 +144,8 @@ class Buffered:
         """Return the call of the compiled function by CasADi's C interface."""
         f = self._function
         pointer = ctypes.c_void_p
-        arguments, results = (pointer * f.sz_arg())(), (pointer * f.sz_res())()
-        for k, array in enumerate(self.inputs.values()):
-            arguments[k] = array.ctypes.data
-        for k, array in enumerate(self.outputs.values()):
-            results[k] = array.ctypes.data
+        arguments = (pointer * f.sz_arg())(*(a.ctypes.data for a in self.inputs.values()))
+        results = (pointer * f.sz_res())(*(a.ctypes.data for a in self.outputs.values()))
         work = (ctypes.c_longlong * (f.sz_iw() + 1))(), (ctypes.c_double * (f.sz_w() + 1))()
         memory = (arguments, results, *work)
         function = getattr(ctypes.PyDLL(str(f.library)), f.name())

@@ -203,9 +203,7 @@ class Controller:
     def _clearances(self, position: np.ndarray, t: float, plan: Plan) -> Tuple[float, float]:
         """Return the distance [m] from hull to surface at a position now, and the plan's least."""
         positions = np.vstack([plan.states[:, POSITION], position])
-        times = np.append(self.nmpc.stage_times(plan.t), t)
-        least = (
-            self._field_of(self.obstacles).distances(positions, times).min(axis=0, initial=np.inf)
-        )
+        field = self._field_of(self.obstacles)
+        least = field.distances(positions, np.append(plan.times, t)).min(axis=0, initial=np.inf)
         radius = self.parameters.vehicle.radius
         return float(least[-1]) - radius, float(least[:-1].min()) - radius

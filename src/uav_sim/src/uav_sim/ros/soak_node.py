@@ -45,9 +45,7 @@ class Observer:
         self.modes: Dict[int, int] = {}
         self.status: Optional[ControllerStatus] = None
         self._measures = False
-        self._plan: Optional[Tuple[float, float]] = (
-            None  # newest: telemetry to receipt, telemetry [s]
-        )
+        self._plan: Optional[Tuple[float, float]] = None  # telemetry to receipt, telemetry [s]
         self._marked: Dict[Tuple[str, int], int] = {}
         listen = (
             ("dji_sdk/flight_control_setpoint_generic", Joy, self._on_command),
